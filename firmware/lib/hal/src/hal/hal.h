@@ -1,0 +1,60 @@
+// What the board's logic asks of the machine it runs on: the UNO (hal_uno) or a
+// computer (hal_host). Nothing else in the firmware may touch registers.
+#pragma once
+
+#include <stdint.h>
+
+#include "protocol/messages.h"
+
+namespace setae {
+
+// Board time: servo frames since start, and microseconds into the current one.
+struct BoardTime {
+  uint32_t frame;
+  uint16_t phase_us;
+};
+
+struct Pulses {
+  uint16_t ticks[protocol::kServos];  // 0.5 us each
+};
+
+// Status and value travel together: a value is never used where a read failed.
+struct SensorReading {
+  protocol::Sensor status;
+  bool fresh;            // a sample that was not handed out before
+  int32_t pressure_raw;  // 4096 LSB/hPa; meaningful only if fresh
+  BoardTime sampled;     // when the sensor had it ready
+};
+
+// Survives a reset, not a power cut. The HAL checks its CRC at start and clears
+// it where it is broken.
+struct Retained {
+  bool pose_known;
+  Pulses pulses;  // last pulses put out
+};
+
+class Hal {
+ public:
+  virtual BoardTime now() = 0;
+
+  // Serial line. Neither call waits.
+  virtual bool read_byte(uint8_t& byte) = 0;
+  virtual uint8_t write_room() = 0;  // bytes that write() will take now
+  virtual void write(const uint8_t* data, uint8_t size) = 0;
+
+  // Pulses for the next servo frame and those after it. The last call before a
+  // frame starts counts, for all servos at once. Bit i of `attached`: servo i
+  // gets pulses.
+  virtual void set_pulses(const Pulses& pulses, uint8_t attached) = 0;
+
+  // Never waits longer than 1 ms.
+  virtual SensorReading read_sensor() = 0;
+
+  virtual protocol::ResetCause reset_cause() = 0;
+  virtual Retained& retained() = 0;
+
+ protected:
+  ~Hal() = default;
+};
+
+}  // namespace setae

@@ -1,0 +1,82 @@
+/* The simulator's C interface: one world of board, plant, sensor, arm and
+ * environment, in virtual time (integer microseconds since power-on).
+ *
+ * Lengths in mm, angles in rad, forces in N. The world's z axis points up. Frame
+ * D of the robot hangs from the arm with its z axis pointing down:
+ * x_D = x_world, y_D = -y_world, z_D = -z_world.
+ *
+ * No call keeps a pointer beyond its return. Every call that can fail returns
+ * 0 on success and a negative code otherwise; setae_world_error says more. */
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define SETAE_BACKBONE_POINTS 21
+#define SETAE_TENDONS 4
+
+typedef struct setae_world setae_world;
+
+typedef struct {
+  int64_t time_us;
+  double arm_mm[3];          /* origin of frame D in the world */
+  double arm_target_mm[3];
+  int32_t arm_moving;
+  int32_t board_attached;    /* bit i: servo i has pulses */
+  double pulse_us[SETAE_TENDONS];        /* what the board puts out; 0 where detached */
+  double servo_length_mm[SETAE_TENDONS]; /* free tendon length that the servo leaves, true */
+  double tension_n[SETAE_TENDONS];
+  double backbone_mm[SETAE_BACKBONE_POINTS][3]; /* frame D, from D to U */
+  double rotation[9];        /* D to U, row major */
+  double filament_mm[2][3];  /* frame D: root and undeformed tip E */
+  double contact_depth_mm;   /* deepest penetration of the undeformed filament */
+  double contact_point_mm[3];/* where, in the world; valid if contact_depth_mm > 0 */
+  double pressure_hpa;       /* true pressure at the sensor, noise included */
+  double plant_residual;     /* scaled gradient norm of the last equilibrium */
+} setae_truth;
+
+/* A world with every parameter at its default; nothing runs yet. */
+setae_world* setae_world_create(uint64_t seed);
+void setae_world_destroy(setae_world*);
+const char* setae_world_error(const setae_world*);
+
+/* Named parameters, e.g. "spring.axial_rate_n_per_mm"; before the start only. */
+int setae_world_parameter_count(void);
+const char* setae_world_parameter_name(int index);
+int setae_world_set(setae_world*, const char* name, double value);
+int setae_world_get(const setae_world*, const char* name, double* value);
+
+/* Solids that the bristle can touch, in the world; before the start only. */
+int setae_world_add_tube(setae_world*, const double axis_point_mm[3], double inner_radius_mm);
+/* Box: centre, edge lengths, turned by yaw about the world's z axis. */
+int setae_world_add_box(setae_world*, const double centre_mm[3], const double edges_mm[3], double yaw_rad);
+
+int setae_world_start(setae_world*, const double arm_mm[3]);
+
+int64_t setae_world_now_us(const setae_world*);
+
+/* Bytes from the host, put on the line at the current time. */
+int setae_world_send(setae_world*, const uint8_t* data, size_t size);
+
+/* Step until bytes for the host are there or the time has come, whichever is
+ * first. `size`: in the room in `data`, out the bytes written. */
+int setae_world_run(setae_world*, int64_t until_us, uint8_t* data, size_t* size);
+
+/* Linear move of the arm with a trapezoidal speed profile; starts now. */
+int setae_world_arm_move(setae_world*, const double target_mm[3], double speed_mm_s, double acceleration_mm_s2);
+int setae_world_arm_stop(setae_world*, double acceleration_mm_s2);
+
+int setae_world_truth(const setae_world*, setae_truth* out);
+
+/* Faults to inject, for tests: 0 none, 1 absent, 2 silent, 3 bus error. */
+int setae_world_sensor_fault(setae_world*, int fault);
+/* The reset button, or DTR: the board starts anew, retained memory survives. */
+int setae_world_reset_board(setae_world*);
+
+#ifdef __cplusplus
+}
+#endif
