@@ -1,0 +1,1 @@
+"""The link's protocol: messages, frames and their one schema."""
