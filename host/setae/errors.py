@@ -298,7 +298,7 @@ class PoseUnknownError(SetaeError):
     The jump can release up to 50 mm of tendon at full speed.
     """
 
-    default_remedy = "Let the spring relax, keep clear, then call enable(pose_unknown_ok=True)."
+    default_remedy = "Let the spring relax, keep clear, then call enable(accept_jump=True)."
 
 
 class DeadlineError(SetaeError, TimeoutError):
