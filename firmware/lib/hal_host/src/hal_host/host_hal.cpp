@@ -1,0 +1,72 @@
+#include "hal_host/host_hal.h"
+
+namespace setae {
+
+constexpr uint16_t HostHal::kFreeTicks;
+
+HostHal::HostHal() {
+  retained_.pose_known = true;
+  for (uint16_t& ticks : retained_.pulses.ticks) ticks = kFreeTicks;
+}
+
+BoardTime HostHal::to_board_time(uint64_t time_us) {
+  return {static_cast<uint32_t>(time_us / protocol::kServoFrameUs),
+          static_cast<uint16_t>(time_us % protocol::kServoFrameUs)};
+}
+
+void HostHal::advance_to(uint64_t board_us) {
+  if (board_us / protocol::kServoFrameUs != board_us_ / protocol::kServoFrameUs) {
+    output_ = next_;
+    output_attached_ = next_attached_;
+  }
+  board_us_ = board_us;
+}
+
+bool HostHal::push_rx(uint8_t byte) {
+  if (receive_.push(byte)) return true;
+  ++rx_overruns_;
+  return false;
+}
+
+void HostHal::push_sample(protocol::Sensor status, int32_t pressure_raw, uint64_t sampled_us) {
+  sensor_ = status;
+  if (status != protocol::Sensor::kOk) return;
+  if (sample_count_ == kSamples) {  // the sensor overwrites what nobody read
+    for (uint8_t i = 1; i < kSamples; ++i) samples_[i - 1] = samples_[i];
+    --sample_count_;
+  }
+  samples_[sample_count_++] = {pressure_raw, sampled_us};
+}
+
+void HostHal::restart(protocol::ResetCause cause) {
+  board_us_ = 0;
+  receive_.clear();
+  transmit_.clear();
+  next_attached_ = 0;
+  output_attached_ = 0;
+  sensor_ = protocol::Sensor::kAbsent;
+  sample_count_ = 0;
+  reset_cause_ = cause;
+}
+
+void HostHal::write(const uint8_t* data, uint8_t size) {
+  for (uint8_t i = 0; i < size; ++i) transmit_.push(data[i]);
+}
+
+void HostHal::set_pulses(const Pulses& pulses, uint8_t attached) {
+  next_ = pulses;
+  next_attached_ = attached;
+}
+
+SensorReading HostHal::read_sensor() {
+  SensorReading reading = {sensor_, false, 0, {0, 0}};
+  if (sample_count_ == 0) return reading;
+  reading.fresh = true;
+  reading.pressure_raw = samples_[0].pressure_raw;
+  reading.sampled = to_board_time(samples_[0].sampled_us);
+  --sample_count_;
+  for (uint8_t i = 0; i < sample_count_; ++i) samples_[i] = samples_[i + 1];
+  return reading;
+}
+
+}  // namespace setae

@@ -1,0 +1,82 @@
+// The HAL on a computer: a board whose time, bytes and samples come from the
+// caller. Buffers are as long as on the UNO, so that they overflow alike.
+#pragma once
+
+#include <stdint.h>
+
+#include "hal/hal.h"
+#include "hal/ring.h"
+
+namespace setae {
+
+class HostHal final : public Hal {
+ public:
+  // What the servos are taken to have been left at: `pulse_free_us` of the
+  // default robot, 850 us. A real board after a power cut knows nothing; see
+  // forget_pose().
+  static constexpr uint16_t kFreeTicks = 1700;
+
+  HostHal();
+
+  // ---- for the simulator ----
+
+  // Board time, microseconds since the board's start; never backwards. At each
+  // multiple of the servo frame the pulses last set become the output.
+  void advance_to(uint64_t board_us);
+  uint64_t board_us() const { return board_us_; }
+
+  // A byte from the line; false and counted where the ring is full.
+  bool push_rx(uint8_t byte);
+  // The next byte for the line.
+  bool pop_tx(uint8_t& byte) { return transmit_.pop(byte); }
+  uint32_t rx_overruns() const { return rx_overruns_; }
+
+  // Status `ok`: a sample that was ready at `sampled_us` (not after now). Any
+  // other status: the sensor fails like this until the next call.
+  void push_sample(protocol::Sensor status, int32_t pressure_raw, uint64_t sampled_us);
+
+  // What the servos get in this frame.
+  const Pulses& output() const { return output_; }
+  uint8_t attached() const { return output_attached_; }
+
+  // The board starts anew at time 0: line, pulses and sensor are lost, retained
+  // memory is not. The caller makes a new Board.
+  void restart(protocol::ResetCause cause);
+  void forget_pose() { retained_.pose_known = false; }
+
+  // ---- Hal ----
+
+  BoardTime now() override { return to_board_time(board_us_); }
+  bool read_byte(uint8_t& byte) override { return receive_.pop(byte); }
+  uint8_t write_room() override { return transmit_.room(); }
+  void write(const uint8_t* data, uint8_t size) override;
+  void set_pulses(const Pulses& pulses, uint8_t attached) override;
+  SensorReading read_sensor() override;
+  protocol::ResetCause reset_cause() override { return reset_cause_; }
+  Retained& retained() override { return retained_; }
+
+ private:
+  static constexpr uint8_t kSamples = 8;
+  struct Sample {
+    int32_t pressure_raw;
+    uint64_t sampled_us;
+  };
+
+  static BoardTime to_board_time(uint64_t time_us);
+
+  uint64_t board_us_ = 0;
+  ByteRing<kReceiveRingBytes> receive_;
+  ByteRing<kTransmitRingBytes> transmit_;
+  uint32_t rx_overruns_ = 0;
+  Pulses next_ = {};
+  uint8_t next_attached_ = 0;
+  Pulses output_ = {};
+  uint8_t output_attached_ = 0;
+  protocol::Sensor sensor_ = protocol::Sensor::kAbsent;
+  Sample samples_[kSamples] = {};
+  uint8_t sample_count_ = 0;
+  protocol::ResetCause reset_cause_ = protocol::ResetCause::kPowerOn;
+  Retained retained_ = {};
+};
+
+}  // namespace setae
