@@ -1,0 +1,131 @@
+"""What carries the robot: an arm or a linear stage that moves frame D through the world.
+
+A stage is driven without waiting: `Stage.move_to` starts a move and returns,
+`Stage.poll` looks at what became of it. The session's one waiting loop polls
+the stage together with the robot, so each is watched while the other moves.
+"""
+
+from __future__ import annotations
+
+import select
+import sys
+from collections.abc import Callable, Sequence
+from typing import IO, Protocol, runtime_checkable
+
+from setae.errors import StageError
+
+
+@runtime_checkable
+class Stage(Protocol):
+    """Moves the origin of frame D. Positions are world coordinates in mm, z up."""
+
+    @property
+    def position_mm(self) -> tuple[float, float, float]:
+        """Where the origin of frame D is now."""
+        ...
+
+    @property
+    def moving(self) -> bool:
+        """True from `move_to` until the target is reached or the stage has stopped."""
+        ...
+
+    def move_to(
+        self,
+        position_mm: Sequence[float],
+        *,
+        speed_mm_s: float | None = None,
+        acceleration_mm_s2: float | None = None,
+    ) -> None:
+        """Start a straight move; returns at once.
+
+        Parameters
+        ----------
+        position_mm
+            Target of frame D's origin, (3,).
+        speed_mm_s, acceleration_mm_s2
+            Bounds of the move; None takes the configured ones.
+
+        Raises
+        ------
+        StageError
+            The stage can't take the move; the message says why.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Brake now; returns without waiting for rest."""
+        ...
+
+    def poll(self, now_us: int) -> None:
+        """Look at the stage at this time. Raises StageError once it has failed."""
+        ...
+
+
+class ManualStage:
+    """A stage that a person moves, with the arm's own pendant or by hand.
+
+    Each move is asked for in words, and ends when the person presses Enter.
+    Positions count from where it was made: they are what was asked for, not
+    measured.
+
+    Parameters
+    ----------
+    ask
+        Shows a line to the person.
+    answers
+        Where Enter is read from: an open text file that `select` can watch.
+    """
+
+    def __init__(
+        self, *, ask: Callable[[str], object] = print, answers: IO[str] | None = None
+    ) -> None:
+        self._ask = ask
+        self._answers = answers if answers is not None else sys.stdin
+        self._position_mm = (0.0, 0.0, 0.0)
+        self._target_mm: tuple[float, float, float] | None = None
+
+    @property
+    def position_mm(self) -> tuple[float, float, float]:
+        """The last position that the person confirmed."""
+        return self._position_mm
+
+    @property
+    def moving(self) -> bool:
+        """True until the person has confirmed the move."""
+        return self._target_mm is not None
+
+    def move_to(
+        self,
+        position_mm: Sequence[float],
+        *,
+        speed_mm_s: float | None = None,
+        acceleration_mm_s2: float | None = None,
+    ) -> None:
+        """Ask for a move; speed and acceleration are the person's."""
+        del speed_mm_s, acceleration_mm_s2
+        x_mm, y_mm, z_mm = (float(value) for value in position_mm)
+        self._target_mm = (x_mm, y_mm, z_mm)
+        self._ask(
+            f"Move the arm to x {x_mm:g}, y {y_mm:g}, z {z_mm:g} mm from its start, slowly,"
+            " then press Enter."
+        )
+
+    def stop(self) -> None:
+        """Tell the person to stop, if a move was asked for."""
+        if self._target_mm is not None:
+            self._target_mm = None
+            self._ask("STOP THE ARM.")
+
+    def poll(self, now_us: int) -> None:
+        """Look whether Enter was pressed; never waits."""
+        del now_us
+        if self._target_mm is None:
+            return
+        readable, _, _ = select.select([self._answers], [], [], 0)
+        if not readable:
+            return
+        if not self._answers.readline():
+            raise StageError(
+                "Nobody can confirm the arm's move: the input ended.", "Run it in a terminal."
+            )
+        self._position_mm, self._target_mm = self._target_mm, None
