@@ -1,0 +1,60 @@
+// Every number of the simulated robot, by name and with its unit.
+#pragma once
+
+#include <array>
+#include <string>
+
+namespace setae {
+namespace sim {
+
+struct Parameters {
+  struct Spring {
+    double free_length_mm, axial_rate_n_per_mm, mean_diameter_mm, outer_diameter_mm, poisson_ratio;
+    double bending_scale_x, bending_scale_y, shear_scale;
+    double solid_length_mm, bore_radius_mm, mass_g, damping_time_s;
+  } spring;
+  struct Tendon {
+    double radius_mm, stiffness_n_per_mm, pulley_radius_mm, backlash_mm;
+    std::array<double, 4> angle_deg, offset_mm, winding_error;
+  } tendon;
+  struct Servo {
+    double dead_band_us, speed_mm_s, time_constant_s;
+    std::array<double, 4> pulse_free_us, direction, us_per_degree;
+  } servo;
+  struct Bristle {
+    double tip_offset_mm, filament_length_mm;
+    double contact_hpa_per_mm, contact_saturation_hpa, relaxation_fraction, relaxation_time_s;
+    double motion_axial_hpa_s2_per_mm, motion_lateral_hpa_s2_per_mm;
+    double natural_frequency_hz, damping_ratio;
+  } bristle;
+  struct Sensor {
+    double ambient_hpa, rate_hz, rate_error, noise_hpa, drift_hpa_per_sqrt_s;
+  } sensor;
+  struct Line {
+    double byte_us, down_latency_us, up_flush_us;
+  } line;
+  struct Board {
+    double clock_rate_ppm, poll_us, boot_us, pose_known;
+  } board;
+  struct PlantPart {
+    double tip_mass_g, gravity_m_s2;
+  } plant;
+};
+
+Parameters default_parameters();
+
+int parameter_count();
+const char* parameter_name(int index);  // null where there is none
+
+// Both return false where there is no such name, or the value is no good; then
+// `error` says which parameter and what it may be.
+bool set_parameter(Parameters& parameters, const std::string& name, double value,
+                   std::string& error);
+bool get_parameter(const Parameters& parameters, const std::string& name, double& value,
+                   std::string& error);
+
+// Whether the values fit each other.
+bool check_parameters(const Parameters& parameters, std::string& error);
+
+}  // namespace sim
+}  // namespace setae

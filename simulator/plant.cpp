@@ -1,0 +1,315 @@
+#include "plant.h"
+
+#include <algorithm>
+
+namespace setae {
+namespace sim {
+namespace {
+
+constexpr int kIterations = 40;
+constexpr int kPatience = 6;           // iterations before the secant is built afresh
+constexpr double kLongestStep = 4;     // root of N mm; half the spring's whole compression
+constexpr double kSecantStep = 1e-4;   // root of N mm
+constexpr double kCreep = 1e-4;        // root of N mm a step
+constexpr double kSolidPenalty = 100;  // times the spring's axial stiffness
+constexpr double kRounding_per_mm = 0.003;
+
+Rigidity rigidity_of(const PlantSettings& s) {
+  // Helical spring, homogenised; constant per reference length.
+  const double axial = s.axial_rate_n_per_mm * s.free_length_mm;
+  const double d2 = s.mean_diameter_mm * s.mean_diameter_mm;
+  const double nu = s.poisson_ratio;
+  const double bending = axial * d2 * (1 + nu) / (2 * (2 + nu));
+  return {s.bending_scale_x * bending, s.bending_scale_y * bending, axial * d2 * (1 + nu) / 4,
+          s.shear_scale * 2 * (1 + nu) * axial, axial};
+}
+
+double inner(const Modes& a, const Modes& b) {
+  double sum = 0;
+  for (int m = 0; m < kModes; ++m) sum += a[m] * b[m];
+  return sum;
+}
+
+}  // namespace
+
+constexpr double Plant::kTolerance;
+
+Plant::Plant(const PlantSettings& settings)
+    : settings_(settings),
+      rod_(rigidity_of(settings), settings.free_length_mm),
+      solid_penalty_(kSolidPenalty * settings.axial_rate_n_per_mm * settings.free_length_mm),
+      solid_ratio_(settings.solid_length_mm / settings.free_length_mm) {
+  for (int i = 0; i < kTendons; ++i) {
+    holes_[i] = {settings.tendon_radius_mm * std::cos(settings.tendon_angle_rad[i]),
+                 settings.tendon_radius_mm * std::sin(settings.tendon_angle_rad[i]), 0};
+  }
+}
+
+void Plant::settle(const std::array<double, kTendons>& lengths_mm) {
+  lengths_mm_ = lengths_mm;
+  double shortest = settings_.free_length_mm;
+  for (double length : lengths_mm) shortest = std::min(shortest, length);
+  anchor_ = rod_.compressed(shortest);
+  damping_ = 0;
+  secant_known_ = false;
+  evaluate(anchor_, state_);
+  solve();
+  creeping_ = false;
+}
+
+void Plant::step(const std::array<double, kTendons>& lengths_mm, double duration_s) {
+  lengths_mm_ = lengths_mm;
+  anchor_ = state_.modes;
+  damping_ = settings_.damping_time_s / duration_s;
+  evaluate(anchor_, state_);
+  solve();
+  double moved = 0;
+  for (int m = 0; m < kModes; ++m) {
+    moved = std::max(moved, std::fabs(state_.modes[m] - anchor_[m]));
+  }
+  creeping_ = moved > kCreep;
+}
+
+// Energy and gradient at `modes`. state.paths should hold nearby paths already.
+void Plant::evaluate(const Modes& modes, State& state) {
+  ++evaluations_;
+  state.modes = modes;
+  rod_.shape(modes, state.shape);
+  state.energy = 0.5 * inner(modes, modes);
+  state.gradient = modes;
+  for (int m = 0; m < kModes; ++m) {
+    const double away = modes[m] - anchor_[m];
+    state.energy += 0.5 * damping_ * away * away;
+    state.gradient[m] += damping_ * away;
+  }
+  state.geometric = Modes{};
+  for (int i = 0; i < kTendons; ++i) {
+    state.paths[i].solve(state.shape, holes_[i], holes_[i], settings_.bore_radius_mm);
+    const double stretch = state.paths[i].length_mm() - lengths_mm_[i];
+    state.tension_n[i] = stretch > 0 ? settings_.tendon_stiffness_n_per_mm * stretch : 0;
+    if (stretch <= 0) continue;
+    state.energy += 0.5 * state.tension_n[i] * stretch;
+    state.path_gradient[i] = Modes{};
+    rod_.pull_back(state.shape, state.paths[i].wrenches(), state.path_gradient[i]);
+    for (int m = 0; m < kModes; ++m) {
+      state.geometric[m] += state.tension_n[i] * state.path_gradient[i][m];
+    }
+  }
+  add_weight(state);
+  for (int m = 0; m < kModes; ++m) state.gradient[m] += state.geometric[m];
+  add_solid(state);
+}
+
+void Plant::add_weight(State& state) const {
+  if (settings_.gravity_m_s2 == 0) return;
+  std::array<Wrench, kStations> wrenches;
+  for (int j = 0; j < kStations; ++j) {
+    const bool end = j == 0 || j == kElements;
+    double mass_g = settings_.spring_mass_g / kElements * (end ? 0.5 : 1.0);
+    if (j == kElements) mass_g += settings_.tip_mass_g;
+    const double weight_n = 1e-3 * mass_g * settings_.gravity_m_s2;
+    state.energy -= weight_n * state.shape.position[j].z;
+    wrenches[j] = {{0, 0, 0}, into(state.shape.rotation[j], {0, 0, -weight_n})};
+  }
+  rod_.pull_back(state.shape, wrenches, state.geometric);
+}
+
+// Coils that touch at the bend's inner side: a stiff one-sided spring. The edge
+// at zero curvature is rounded, otherwise a straight crushed spring sits on a kink.
+bool Plant::solid_contact(const Strain& strain, SolidContact& contact) const {
+  const double radius = 0.5 * settings_.outer_diameter_mm;
+  const double x = strain.curvature.x, y = strain.curvature.y;
+  contact.bend_per_mm = std::sqrt(x * x + y * y + kRounding_per_mm * kRounding_per_mm);
+  contact.gap = strain.stretch.z - radius * (contact.bend_per_mm - kRounding_per_mm) - solid_ratio_;
+  contact.x = x / contact.bend_per_mm;
+  contact.y = y / contact.bend_per_mm;
+  contact.slope = {{-radius * contact.x, -radius * contact.y, 0}, {0, 0, 1}};
+  return contact.gap < 0;
+}
+
+void Plant::add_solid(State& state) const {
+  const double stiffness = solid_penalty_ * rod_.element_mm();
+  SolidContact contact;
+  for (int e = 0; e < kElements; ++e) {
+    if (!solid_contact(state.shape.strain[e], contact)) continue;
+    state.energy += 0.5 * stiffness * contact.gap * contact.gap;
+    const double force = stiffness * contact.gap;
+    rod_.pull_back_strain(e, {force * contact.slope.curvature, force * contact.slope.stretch},
+                          state.gradient);
+  }
+}
+
+void Plant::add_solid_hessian(const State& state, Matrix& hessian) const {
+  const double stiffness = solid_penalty_ * rod_.element_mm();
+  SolidContact contact;
+  for (int e = 0; e < kElements; ++e) {
+    if (!solid_contact(state.shape.strain[e], contact)) continue;
+    Modes slope{}, by_x{}, by_y{};
+    rod_.pull_back_strain(e, contact.slope, slope);
+    rod_.pull_back_strain(e, {{1, 0, 0}, {0, 0, 0}}, by_x);
+    rod_.pull_back_strain(e, {{0, 1, 0}, {0, 0, 0}}, by_y);
+    const double round =
+        -stiffness * contact.gap * 0.5 * settings_.outer_diameter_mm / contact.bend_per_mm;
+    for (int m = 0; m < kModes; ++m) {
+      const double along_m = contact.x * by_x[m] + contact.y * by_y[m];
+      for (int k = 0; k < kModes; ++k) {
+        const double along_k = contact.x * by_x[k] + contact.y * by_y[k];
+        hessian[m][k] += stiffness * slope[m] * slope[k] +
+                         round * (by_x[m] * by_x[k] + by_y[m] * by_y[k] - along_m * along_k);
+      }
+    }
+  }
+}
+
+// Newton with a line search. The stiff parts of the Hessian are exact; the
+// geometric part is a secant, kept from step to step.
+void Plant::solve() {
+  int since_rebuild = 0;
+  bool fresh = false;
+  if (!secant_known_) {
+    rebuild_secant();
+    fresh = true;
+  }
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    residual_ = std::sqrt(inner(state_.gradient, state_.gradient));
+    if (residual_ < kTolerance) return;
+    if (since_rebuild >= kPatience) {
+      rebuild_secant();
+      fresh = true;
+      since_rebuild = 0;
+    }
+    Modes step;
+    const bool descends = newton_step(step);
+    const double slope = inner(state_.gradient, step);
+    double fraction = std::min(1.0, kLongestStep / std::sqrt(inner(step, step)));
+    bool accepted = false;
+    for (int halving = 0; descends && halving < 25; ++halving) {
+      Modes modes = state_.modes;
+      for (int m = 0; m < kModes; ++m) modes[m] += fraction * step[m];
+      trial_.paths = state_.paths;
+      evaluate(modes, trial_);
+      if (trial_.energy <= state_.energy + 1e-4 * fraction * slope + 1e-11) {
+        accepted = true;
+        break;
+      }
+      fraction *= 0.5;
+    }
+    if (accepted) {
+      update_secant(state_, trial_);
+      std::swap(state_, trial_);
+      ++since_rebuild;
+      fresh = false;
+    } else {
+      if (fresh) break;
+      rebuild_secant();
+      fresh = true;
+      since_rebuild = 0;
+    }
+  }
+  residual_ = std::sqrt(inner(state_.gradient, state_.gradient));
+}
+
+// Step from the modified Newton system; false if it can't be made to descend.
+bool Plant::newton_step(Modes& step) const {
+  Matrix hessian = secant_;
+  for (int m = 0; m < kModes; ++m) hessian[m][m] += 1 + damping_;
+  for (int i = 0; i < kTendons; ++i) {
+    if (state_.tension_n[i] <= 0) continue;
+    for (int m = 0; m < kModes; ++m) {
+      const double weight = settings_.tendon_stiffness_n_per_mm * state_.path_gradient[i][m];
+      for (int k = 0; k <= m; ++k) hessian[m][k] += weight * state_.path_gradient[i][k];
+    }
+  }
+  add_solid_hessian(state_, hessian);
+
+  double shift = 0;
+  for (int attempt = 0; attempt < 12; ++attempt) {
+    Matrix factor{};
+    bool positive = true;
+    for (int m = 0; m < kModes && positive; ++m) {
+      for (int k = 0; k <= m; ++k) {
+        double sum = hessian[m][k] + (m == k ? shift : 0);
+        for (int l = 0; l < k; ++l) sum -= factor[m][l] * factor[k][l];
+        if (m == k) {
+          positive = sum > 1e-3;
+          if (!positive) break;
+          factor[m][m] = std::sqrt(sum);
+        } else {
+          factor[m][k] = sum / factor[k][k];
+        }
+      }
+    }
+    if (!positive) {
+      shift = shift == 0 ? 0.25 : 2 * shift;
+      continue;
+    }
+    for (int m = 0; m < kModes; ++m) {
+      double sum = -state_.gradient[m];
+      for (int k = 0; k < m; ++k) sum -= factor[m][k] * step[k];
+      step[m] = sum / factor[m][m];
+    }
+    for (int m = kModes - 1; m >= 0; --m) {
+      double sum = step[m];
+      for (int k = m + 1; k < kModes; ++k) sum -= factor[k][m] * step[k];
+      step[m] = sum / factor[m][m];
+    }
+    return inner(step, state_.gradient) < 0;
+  }
+  return false;
+}
+
+// The gradient of tendons and weight with the tensions held at other values.
+Modes Plant::frozen_gradient(const State& state,
+                             const std::array<double, kTendons>& tension_n) const {
+  Modes out = state.geometric;
+  for (int i = 0; i < kTendons; ++i) {
+    const double extra = tension_n[i] - state.tension_n[i];
+    if (extra == 0) continue;
+    Modes gradient{};
+    if (state.tension_n[i] > 0) {
+      gradient = state.path_gradient[i];
+    } else {
+      rod_.pull_back(state.shape, state.paths[i].wrenches(), gradient);
+    }
+    for (int m = 0; m < kModes; ++m) out[m] += extra * gradient[m];
+  }
+  return out;
+}
+
+void Plant::rebuild_secant() {
+  const std::array<double, kTendons> tension_n = state_.tension_n;
+  for (int k = 0; k < kModes; ++k) {
+    Modes modes = state_.modes;
+    modes[k] += kSecantStep;
+    trial_.paths = state_.paths;
+    evaluate(modes, trial_);
+    const Modes moved = frozen_gradient(trial_, tension_n);
+    for (int m = 0; m < kModes; ++m) {
+      secant_[m][k] = (moved[m] - state_.geometric[m]) / kSecantStep;
+    }
+  }
+  for (int m = 0; m < kModes; ++m) {
+    for (int k = 0; k < m; ++k) {
+      secant_[m][k] = secant_[k][m] = 0.5 * (secant_[m][k] + secant_[k][m]);
+    }
+  }
+  secant_known_ = true;
+}
+
+// Symmetric rank one: needs no positive curvature, which this part does not have.
+void Plant::update_secant(const State& from, const State& to) {
+  const Modes before = frozen_gradient(from, to.tension_n);
+  Modes step, rest;
+  for (int m = 0; m < kModes; ++m) step[m] = to.modes[m] - from.modes[m];
+  for (int m = 0; m < kModes; ++m) {
+    rest[m] = to.geometric[m] - before[m] - inner(secant_[m], step);
+  }
+  const double along = inner(rest, step);
+  if (std::fabs(along) < 1e-3 * std::sqrt(inner(rest, rest) * inner(step, step))) return;
+  for (int m = 0; m < kModes; ++m) {
+    for (int k = 0; k < kModes; ++k) secant_[m][k] += rest[m] * rest[k] / along;
+  }
+}
+
+}  // namespace sim
+}  // namespace setae

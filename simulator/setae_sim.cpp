@@ -1,0 +1,289 @@
+#include "setae_sim.h"
+
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+#include <string>
+
+#include "world.h"
+
+#if defined(_WIN32)
+#define SETAE_EXPORT extern "C" __declspec(dllexport)
+#else
+#define SETAE_EXPORT extern "C" __attribute__((visibility("default")))
+#endif
+
+using setae::sim::Environment;
+using setae::sim::Parameters;
+using setae::sim::Truth;
+using setae::sim::Vec3;
+using setae::sim::World;
+
+struct setae_world {
+  uint64_t seed;
+  Parameters parameters;
+  Environment environment;
+  std::unique_ptr<World> world;  // from the start on
+  std::string error;
+};
+
+namespace {
+
+constexpr int kBadArgument = -1;
+constexpr int kWrongTime = -2;
+constexpr int kNoSolution = -3;
+constexpr int kInternal = -4;
+
+int fail(setae_world* world, int code, const std::string& text) {
+  world->error = text;
+  return code;
+}
+
+// No exception may cross into C.
+template <typename Action>
+int guarded(setae_world* world, Action action) {
+  try {
+    return action();
+  } catch (const std::exception& error) {
+    return fail(world, kInternal, error.what());
+  }
+}
+
+bool finite(const double (&values)[3]) {
+  return std::isfinite(values[0]) && std::isfinite(values[1]) && std::isfinite(values[2]);
+}
+
+bool read(const double* from, Vec3& out) {
+  if (from == nullptr) return false;
+  const double values[3] = {from[0], from[1], from[2]};
+  out = {values[0], values[1], values[2]};
+  return finite(values);
+}
+
+bool positive(double value) { return std::isfinite(value) && value > 0; }
+
+void write(const Vec3& from, double* out) {
+  out[0] = from.x;
+  out[1] = from.y;
+  out[2] = from.z;
+}
+
+constexpr const char* kNotStarted = "the world has not been started";
+constexpr const char* kStarted = "the world has been started already";
+
+}  // namespace
+
+SETAE_EXPORT setae_world* setae_world_create(uint64_t seed) {
+  try {
+    return new setae_world{seed, setae::sim::default_parameters(), {}, nullptr, {}};
+  } catch (const std::exception&) {
+    return nullptr;
+  }
+}
+
+SETAE_EXPORT void setae_world_destroy(setae_world* world) { delete world; }
+
+SETAE_EXPORT const char* setae_world_error(const setae_world* world) {
+  return world->error.c_str();
+}
+
+SETAE_EXPORT int setae_world_parameter_count(void) { return setae::sim::parameter_count(); }
+
+SETAE_EXPORT const char* setae_world_parameter_name(int index) {
+  return setae::sim::parameter_name(index);
+}
+
+SETAE_EXPORT int setae_world_set(setae_world* world, const char* name, double value) {
+  if (world->world) return fail(world, kWrongTime, kStarted);
+  if (name == nullptr) return fail(world, kBadArgument, "a parameter needs a name");
+  return guarded(world, [&] {
+    return setae::sim::set_parameter(world->parameters, name, value, world->error) ? 0
+                                                                                   : kBadArgument;
+  });
+}
+
+SETAE_EXPORT int setae_world_get(const setae_world* world, const char* name, double* value) {
+  setae_world* mutable_world = const_cast<setae_world*>(world);  // for the error's text
+  if (name == nullptr || value == nullptr) {
+    return fail(mutable_world, kBadArgument, "a parameter needs a name and a place to go");
+  }
+  return guarded(mutable_world, [&] {
+    return setae::sim::get_parameter(world->parameters, name, *value, mutable_world->error)
+               ? 0
+               : kBadArgument;
+  });
+}
+
+SETAE_EXPORT int setae_world_add_tube(setae_world* world, const double axis_point_mm[3],
+                                      double inner_radius_mm) {
+  if (world->world) return fail(world, kWrongTime, kStarted);
+  Vec3 axis_point;
+  if (!read(axis_point_mm, axis_point)) {
+    return fail(world, kBadArgument, "the tube's axis_point_mm must be three finite numbers");
+  }
+  if (!positive(inner_radius_mm)) {
+    return fail(world, kBadArgument, "the tube's inner_radius_mm must be positive");
+  }
+  return guarded(world, [&] {
+    world->environment.add_tube(axis_point, inner_radius_mm);
+    return 0;
+  });
+}
+
+SETAE_EXPORT int setae_world_add_box(setae_world* world, const double centre_mm[3],
+                                     const double edges_mm[3], double yaw_rad) {
+  if (world->world) return fail(world, kWrongTime, kStarted);
+  Vec3 centre, edges;
+  if (!read(centre_mm, centre)) {
+    return fail(world, kBadArgument, "the box's centre_mm must be three finite numbers");
+  }
+  if (!read(edges_mm, edges) || edges.x <= 0 || edges.y <= 0 || edges.z <= 0) {
+    return fail(world, kBadArgument, "the box's edges_mm must be three positive numbers");
+  }
+  if (!std::isfinite(yaw_rad)) {
+    return fail(world, kBadArgument, "the box's yaw_rad must be finite");
+  }
+  return guarded(world, [&] {
+    world->environment.add_box(centre, edges, yaw_rad);
+    return 0;
+  });
+}
+
+SETAE_EXPORT int setae_world_start(setae_world* world, const double arm_mm[3]) {
+  if (world->world) return fail(world, kWrongTime, kStarted);
+  Vec3 arm;
+  if (!read(arm_mm, arm)) {
+    return fail(world, kBadArgument, "arm_mm must be three finite numbers");
+  }
+  return guarded(world, [&] {
+    if (!setae::sim::check_parameters(world->parameters, world->error)) return kBadArgument;
+    auto started = std::make_unique<World>(world->parameters, world->environment, world->seed, arm);
+    if (!started->solved()) {
+      return fail(world, kNoSolution, "the spring has no equilibrium with these parameters");
+    }
+    world->world = std::move(started);
+    return 0;
+  });
+}
+
+SETAE_EXPORT int64_t setae_world_now_us(const setae_world* world) {
+  return world->world ? world->world->now_us() : 0;
+}
+
+SETAE_EXPORT int setae_world_send(setae_world* world, const uint8_t* data, size_t size) {
+  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (data == nullptr && size > 0) return fail(world, kBadArgument, "no bytes to send");
+  return guarded(world, [&] {
+    world->world->send(data, size);
+    return 0;
+  });
+}
+
+SETAE_EXPORT int setae_world_run(setae_world* world, int64_t until_us, uint8_t* data,
+                                 size_t* size) {
+  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (data == nullptr || size == nullptr || *size == 0) {
+    return fail(world, kBadArgument, "run needs room for the bytes it returns");
+  }
+  const size_t room = *size;
+  *size = 0;
+  return guarded(world, [&] {
+    if (!world->world->run(until_us)) {
+      return fail(world, kNoSolution,
+                  "the spring's equilibrium could not be found for several samples in a row");
+    }
+    *size = world->world->read(data, room);
+    return 0;
+  });
+}
+
+SETAE_EXPORT int setae_world_arm_move(setae_world* world, const double target_mm[3],
+                                      double speed_mm_s, double acceleration_mm_s2) {
+  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  Vec3 target;
+  if (!read(target_mm, target)) {
+    return fail(world, kBadArgument, "target_mm must be three finite numbers");
+  }
+  if (!positive(speed_mm_s) || !positive(acceleration_mm_s2)) {
+    return fail(world, kBadArgument, "speed_mm_s and acceleration_mm_s2 must be positive");
+  }
+  const int64_t now_us = world->world->now_us();
+  if (world->world->arm().moving(now_us)) {
+    return fail(world, kWrongTime, "the arm is moving: stop it first");
+  }
+  world->world->arm().move(now_us, target, speed_mm_s, acceleration_mm_s2);
+  return 0;
+}
+
+SETAE_EXPORT int setae_world_arm_stop(setae_world* world, double acceleration_mm_s2) {
+  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (!positive(acceleration_mm_s2)) {
+    return fail(world, kBadArgument, "acceleration_mm_s2 must be positive");
+  }
+  world->world->arm().stop(world->world->now_us(), acceleration_mm_s2);
+  return 0;
+}
+
+SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
+  setae_world* mutable_world = const_cast<setae_world*>(world);  // for the error's text
+  if (!world->world) return fail(mutable_world, kWrongTime, kNotStarted);
+  if (out == nullptr) return fail(mutable_world, kBadArgument, "truth needs a place to go");
+  return guarded(mutable_world, [&] {
+    const World& w = *world->world;
+    const Truth truth = w.truth();
+    const setae::sim::Plant& plant = truth.body.plant;
+    const setae::sim::Shape& shape = plant.shape();
+    std::memset(out, 0, sizeof *out);
+    out->time_us = w.now_us();
+    write(w.arm().position_mm(w.now_us()), out->arm_mm);
+    write(w.arm().target_mm(), out->arm_target_mm);
+    out->arm_moving = w.arm().moving(w.now_us());
+    out->board_attached = w.hal().attached();
+    for (int i = 0; i < SETAE_TENDONS; ++i) {
+      if (w.hal().attached() >> i & 1) {
+        out->pulse_us[i] = static_cast<double>(w.hal().output().ticks[i]) /
+                           setae::protocol::kPulseTicksPerUs;
+      }
+      out->servo_length_mm[i] = truth.body.servos[i].length_mm();
+      out->tension_n[i] = plant.tension_n()[i];
+    }
+    static_assert(SETAE_BACKBONE_POINTS == 2 * setae::sim::kElements + 1,
+                  "the backbone's points are stations and midpoints");
+    for (int j = 0; j < setae::sim::kStations; ++j) {
+      write(shape.position[j], out->backbone_mm[2 * j]);
+      if (j < setae::sim::kElements) {
+        write(plant.rod().midpoint(shape, j), out->backbone_mm[2 * j + 1]);
+      }
+    }
+    const setae::sim::Mat3& top = shape.rotation[setae::sim::kElements];
+    const double rotation[9] = {top.ex.x, top.ey.x, top.ez.x, top.ex.y, top.ey.y,
+                                top.ez.y, top.ex.z, top.ey.z, top.ez.z};
+    std::memcpy(out->rotation, rotation, sizeof rotation);
+    write(truth.root_mm, out->filament_mm[0]);
+    write(truth.tip_mm, out->filament_mm[1]);
+    out->contact_depth_mm = truth.contact.depth_mm;
+    write(truth.contact.point_mm, out->contact_point_mm);
+    out->pressure_hpa = w.pressure_hpa();
+    out->plant_residual = plant.residual();
+    return 0;
+  });
+}
+
+SETAE_EXPORT int setae_world_sensor_fault(setae_world* world, int fault) {
+  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (fault < 0 || fault > 3) {
+    return fail(world, kBadArgument, "a sensor fault is 0 (none), 1, 2 or 3");
+  }
+  world->world->set_sensor_fault(static_cast<setae::sim::SensorFault>(fault));
+  return 0;
+}
+
+SETAE_EXPORT int setae_world_reset_board(setae_world* world) {
+  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  return guarded(world, [&] {
+    world->world->reset_board();
+    return 0;
+  });
+}

@@ -1,0 +1,281 @@
+#include "world.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace setae {
+namespace sim {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+// Samples in a row without a solution that end a run. One alone can be a snap
+// from one equilibrium to another.
+constexpr int kUnsolvedMost = 10;
+
+PlantSettings plant_settings(const Parameters& p) {
+  PlantSettings s{};
+  s.free_length_mm = p.spring.free_length_mm;
+  s.axial_rate_n_per_mm = p.spring.axial_rate_n_per_mm;
+  s.mean_diameter_mm = p.spring.mean_diameter_mm;
+  s.outer_diameter_mm = p.spring.outer_diameter_mm;
+  s.poisson_ratio = p.spring.poisson_ratio;
+  s.bending_scale_x = p.spring.bending_scale_x;
+  s.bending_scale_y = p.spring.bending_scale_y;
+  s.shear_scale = p.spring.shear_scale;
+  s.solid_length_mm = p.spring.solid_length_mm;
+  s.bore_radius_mm = p.spring.bore_radius_mm;
+  s.damping_time_s = p.spring.damping_time_s;
+  s.spring_mass_g = p.spring.mass_g;
+  s.tip_mass_g = p.plant.tip_mass_g;
+  s.gravity_m_s2 = p.plant.gravity_m_s2;
+  s.tendon_stiffness_n_per_mm = p.tendon.stiffness_n_per_mm;
+  s.tendon_radius_mm = p.tendon.radius_mm;
+  for (int i = 0; i < kTendons; ++i) s.tendon_angle_rad[i] = kDegree * p.tendon.angle_deg[i];
+  return s;
+}
+
+ServoSettings servo_settings(const Parameters& p, int i) {
+  const double mm_per_us = kDegree * p.tendon.pulley_radius_mm / p.servo.us_per_degree[i];
+  ServoSettings s{};
+  s.dead_band_us = p.servo.dead_band_us;
+  s.speed_us_s = p.servo.speed_mm_s / mm_per_us;
+  s.time_constant_s = p.servo.time_constant_s;
+  s.pulse_free_us = p.servo.pulse_free_us[i];
+  s.mm_per_us = mm_per_us * p.servo.direction[i];
+  s.free_length_mm = p.spring.free_length_mm + p.tendon.offset_mm[i];
+  s.winding_error = p.tendon.winding_error[i];
+  s.backlash_mm = p.tendon.backlash_mm;
+  return s;
+}
+
+BristleSettings bristle_settings(const Parameters& p) {
+  BristleSettings s{};
+  s.contact_hpa_per_mm = p.bristle.contact_hpa_per_mm;
+  s.contact_saturation_hpa = p.bristle.contact_saturation_hpa;
+  s.relaxation_fraction = p.bristle.relaxation_fraction;
+  s.relaxation_time_s = p.bristle.relaxation_time_s;
+  s.motion_axial_hpa_s2_per_mm = p.bristle.motion_axial_hpa_s2_per_mm;
+  s.motion_lateral_hpa_s2_per_mm = p.bristle.motion_lateral_hpa_s2_per_mm;
+  s.natural_frequency_hz = p.bristle.natural_frequency_hz;
+  s.damping_ratio = p.bristle.damping_ratio;
+  s.noise_hpa = p.sensor.noise_hpa;
+  s.drift_hpa_per_sqrt_s = p.sensor.drift_hpa_per_sqrt_s;
+  return s;
+}
+
+Body make_body(const Parameters& p) {
+  Body body{{}, Plant(plant_settings(p))};
+  std::array<double, kTendons> lengths_mm;
+  for (int i = 0; i < kTendons; ++i) {
+    body.servos.emplace_back(servo_settings(p, i));
+    lengths_mm[i] = body.servos[i].length_mm();
+  }
+  body.plant.settle(lengths_mm);
+  return body;
+}
+
+LineSettings line_settings(const Parameters& p) {
+  return {std::llround(p.line.byte_us), std::llround(p.line.down_latency_us),
+          std::llround(p.line.up_flush_us)};
+}
+
+int64_t sample_time_us(const Parameters& p, int64_t number) {
+  const double rate_hz = p.sensor.rate_hz * (1 + p.sensor.rate_error);
+  return std::llround(1e6 * static_cast<double>(number) / rate_hz);
+}
+
+}  // namespace
+
+World::World(const Parameters& parameters, const Environment& environment, uint64_t seed,
+             const Vec3& arm_mm)
+    : parameters_(parameters),
+      environment_(environment),
+      clock_error_ppb_(std::llround(1000 * parameters.board.clock_rate_ppm)),
+      line_(line_settings(parameters)),
+      body_(make_body(parameters)),
+      bristle_(bristle_settings(parameters), seed),
+      next_sample_us_(sample_time_us(parameters, 1)) {
+  arm_.place(arm_mm);
+  Vec3 root_mm, tip_mm;
+  filament(body_, root_mm, tip_mm);
+  bristle_.place(in_world(root_mm));
+  if (parameters.board.pose_known == 0) hal_.forget_pose();
+  boot();
+}
+
+bool World::run(int64_t until_us) {
+  while (!line_.host_has_bytes() && now_us_ < until_us) {
+    // The board runs at events only, so that nothing depends on how a caller
+    // slices the time.
+    const int64_t next_us = next_event_us();
+    now_us_ = std::min(next_us, until_us);
+    if (next_us <= now_us_) handle_events();
+    if (unsolved_ >= kUnsolvedMost) return false;
+  }
+  return true;
+}
+
+int64_t World::next_event_us() const {
+  int64_t next_us = std::min({next_sample_us_, line_.next_arrival_us(),
+                              line_.next_transmitted_us(), line_.next_flush_us()});
+  if (!board_) return std::min(next_us, boot_us_);
+  return std::min({next_us, next_frame_us_, next_poll_us_});
+}
+
+void World::handle_events() {
+  bool poll = boot();
+  if (board_) hal_.advance_to(static_cast<uint64_t>(board_us(now_us_)));
+  poll |= start_frame();
+  poll |= sample();
+  poll |= receive();
+  if (line_.next_transmitted_us() <= now_us_) {
+    line_.finish_transmit();
+    poll = true;
+  }
+  if (next_poll_us_ <= now_us_) {
+    next_poll_us_ += std::llround(parameters_.board.poll_us);
+    poll = true;
+  }
+  if (board_ && poll) board_->poll();
+  transmit();
+  if (line_.next_flush_us() <= now_us_) line_.flush();
+}
+
+int64_t World::board_us(int64_t world_us) const {
+  const int64_t elapsed_us = world_us - boot_us_;
+  return elapsed_us + elapsed_us * clock_error_ppb_ / 1000000000;
+}
+
+int64_t World::world_us(int64_t board_us_wanted) const {
+  int64_t time_us = boot_us_ + static_cast<int64_t>(static_cast<double>(board_us_wanted) /
+                                                    (1 + 1e-9 * clock_error_ppb_));
+  while (board_us(time_us) >= board_us_wanted) --time_us;
+  while (board_us(time_us) < board_us_wanted) ++time_us;
+  return time_us;
+}
+
+bool World::boot() {
+  if (board_ || now_us_ < boot_us_) return false;
+  board_ = std::make_unique<Board>(hal_);
+  frame_ = 1;
+  next_frame_us_ = world_us(protocol::kServoFrameUs);
+  next_poll_us_ = now_us_;
+  return true;
+}
+
+void World::reset_board() {
+  board_.reset();
+  hal_.restart(protocol::ResetCause::kExternal);
+  line_.abort_transmit();
+  boot_us_ = now_us_ + std::llround(parameters_.board.boot_us);
+  next_frame_us_ = kNever;
+  next_poll_us_ = kNever;
+  for (Servo& servo : body_.servos) {
+    servo.advance_to(now_us_);
+    servo.detach();
+  }
+}
+
+bool World::start_frame() {
+  if (!board_ || next_frame_us_ > now_us_) return false;
+  for (int i = 0; i < kTendons; ++i) {
+    Servo& servo = body_.servos[i];
+    servo.advance_to(now_us_);
+    if ((hal_.attached() >> i & 1) == 0) {
+      servo.detach();
+      continue;
+    }
+    // The servo's own clock is right: a board that runs fast sends short pulses.
+    const double width_us = static_cast<double>(hal_.output().ticks[i]) /
+                            protocol::kPulseTicksPerUs / (1 + 1e-9 * clock_error_ppb_);
+    servo.pulse(now_us_ + std::llround(width_us), width_us);
+  }
+  ++frame_;
+  next_frame_us_ = world_us(frame_ * protocol::kServoFrameUs);
+  return true;
+}
+
+bool World::receive() {
+  bool received = false;
+  while (line_.next_arrival_us() <= now_us_) {
+    const uint8_t byte = line_.take_arrival();
+    if (!board_) continue;  // nobody listens while it boots
+    hal_.push_rx(byte);
+    received = true;
+  }
+  return received;
+}
+
+void World::transmit() {
+  uint8_t byte;
+  if (board_ && line_.transmitter_free() && hal_.pop_tx(byte)) line_.transmit(now_us_, byte);
+}
+
+bool World::sample() {
+  if (next_sample_us_ > now_us_) return false;
+  const int64_t duration_us = now_us_ - last_sample_us_;
+  move(body_, duration_us);
+  unsolved_ = body_.plant.solved() ? 0 : unsolved_ + 1;
+  Vec3 root_mm, tip_mm;
+  filament(body_, root_mm, tip_mm);
+  const Vec3 root = in_world(root_mm), tip = in_world(tip_mm);
+  const Contact contact = environment_.deepest(root, tip);
+  bristle_.step(1e-6 * static_cast<double>(duration_us), root,
+                flip(body_.plant.shape().rotation[kElements].ez), contact.depth_mm);
+  last_sample_us_ = now_us_;
+  ++samples_;
+  next_sample_us_ = sample_time_us(parameters_, samples_ + 1);
+
+  if (!board_) return false;
+  const uint64_t sampled_us = hal_.board_us();
+  switch (sensor_fault_) {
+    case SensorFault::kNone:
+      hal_.push_sample(protocol::Sensor::kOk,
+                       static_cast<int32_t>(std::lround(protocol::kPressureLsbPerHpa *
+                                                        pressure_hpa())),
+                       sampled_us);
+      break;
+    case SensorFault::kAbsent:
+      hal_.push_sample(protocol::Sensor::kAbsent, 0, sampled_us);
+      break;
+    case SensorFault::kBus:
+      hal_.push_sample(protocol::Sensor::kBus, 0, sampled_us);
+      break;
+    case SensorFault::kSilent:
+      break;
+  }
+  return true;
+}
+
+// Brings servos and spring to the present time, the spring from `duration_us` ago.
+void World::move(Body& body, int64_t duration_us) const {
+  std::array<double, kTendons> lengths_mm;
+  for (int i = 0; i < kTendons; ++i) {
+    body.servos[i].advance_to(now_us_);
+    lengths_mm[i] = body.servos[i].length_mm();
+  }
+  if (duration_us <= 0) return;
+  if (lengths_mm == body.plant.lengths_mm() && !body.plant.creeping() && body.plant.solved()) {
+    return;
+  }
+  body.plant.step(lengths_mm, 1e-6 * static_cast<double>(duration_us));
+}
+
+void World::filament(const Body& body, Vec3& root_mm, Vec3& tip_mm) const {
+  const Vec3 top_mm = body.plant.shape().position[kElements];
+  const Vec3 axis = body.plant.shape().rotation[kElements].ez;
+  const double tip_offset_mm = parameters_.bristle.tip_offset_mm;
+  root_mm = top_mm + (tip_offset_mm - parameters_.bristle.filament_length_mm) * axis;
+  tip_mm = top_mm + tip_offset_mm * axis;
+}
+
+Truth World::truth() const {
+  Truth truth{body_, {}, {}, {}};
+  move(truth.body, now_us_ - last_sample_us_);
+  filament(truth.body, truth.root_mm, truth.tip_mm);
+  truth.contact = environment_.deepest(in_world(truth.root_mm), in_world(truth.tip_mm));
+  return truth;
+}
+
+}  // namespace sim
+}  // namespace setae
