@@ -492,6 +492,8 @@ def python_type(field: Field, *, codes: bool) -> str:
         base = field.codes
     for count in reversed(field.shape):
         base = "tuple[" + ", ".join([base] * count) + "]"
+        # Four numbers are always one for each servo.
+        base = "Ticks" if base == "tuple[int, int, int, int]" else base
     return base
 
 
@@ -519,7 +521,7 @@ def python_rebuild(fields: tuple[Field, ...], start: int, *, codes: bool) -> tup
             for _ in range(field.shape[0]):
                 parts, start = python_rebuild(field.kind.fields, start, codes=False)
                 items.append(f"{field.kind.name}({', '.join(parts)})")
-            out.append("(" + ", ".join(items) + ")")
+            out.append("(\n" + "".join(f"                {item},\n" for item in items) + "            )")
             continue
 
         def group(shape: tuple[int, ...], field: Field = field) -> str:
@@ -537,9 +539,15 @@ def python_rebuild(fields: tuple[Field, ...], start: int, *, codes: bool) -> tup
     return out, start
 
 
+def python_summary(doc: str) -> list[str]:
+    """Open a docstring; a second sentence goes into a paragraph of its own."""
+    first, stop, rest = doc.partition(". ")
+    lines = [f'    """{first}{stop.strip()}']
+    return [*lines, "", *wrap(rest, "    ", 96)] if rest else lines
+
+
 def python_docstring(doc: str, fields: tuple[Field, ...]) -> list[str]:
-    lines = wrap(f'"""{doc}', "    ", 96)
-    lines += ["", "    Attributes", "    ----------"]
+    lines = [*python_summary(doc), "", "    Attributes", "    ----------"]
     for field in fields:
         lines.append(f"    {field.name}")
         lines += wrap(field.doc, "        ", 96)
@@ -612,6 +620,9 @@ def python_module() -> str:
         "from types import MappingProxyType",
         "from typing import ClassVar, Final, Self, TypeAlias",
         "",
+        "Ticks: TypeAlias = tuple[int, int, int, int]",
+        '"""One number for each servo."""',
+        "",
     ]
     for constant in schema.CONSTANTS:
         lines.append(f"{constant.name}: Final = {constant.value}")
@@ -628,7 +639,12 @@ def python_module() -> str:
     for codes in schema.CODES:
         table = f"_{codes.name.upper()}"
         has_remedy = any(code.remedy for code in codes.values)
-        lines += ["", "", f"class {codes.name}(IntEnum):", *wrap(f'"""{codes.doc}"""', "    ", 96), ""]
+        summary = python_summary(codes.doc)
+        if len(summary) == 1:
+            summary[0] += '"""'
+        else:
+            summary.append('    """')
+        lines += ["", "", f"class {codes.name}(IntEnum):", *summary, ""]
         for code in codes.values:
             lines.append(f"    {code.name.upper()} = {code.value}")
         lines += [

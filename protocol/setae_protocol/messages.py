@@ -13,6 +13,9 @@ from enum import IntEnum
 from types import MappingProxyType
 from typing import ClassVar, Final, Self, TypeAlias
 
+Ticks: TypeAlias = tuple[int, int, int, int]
+"""One number for each servo."""
+
 PROTOCOL_VERSION: Final = 1
 """Raised whenever host and board of two versions can't work together."""
 BAUD: Final = 250000
@@ -178,7 +181,10 @@ _RECORD_DOC: Mapping[Record, str] = MappingProxyType(
 
 
 class Fault(IntEnum):
-    """What is broken. Each one freezes the pulses."""
+    """What is broken.
+
+    Each one freezes the pulses.
+    """
 
     NONE = 0
     SENSOR_ABSENT = 1
@@ -244,8 +250,10 @@ _FAULT_REMEDY: Mapping[Fault, str] = MappingProxyType(
 
 
 class Refusal(IntEnum):
-    """Why a command was not carried out. A refused `segments` or `guard` also drops the queue
-    and raises the epoch."""
+    """Why a command was not carried out.
+
+    A refused `segments` or `guard` also drops the queue and raises the epoch.
+    """
 
     NONE = 0
     NOT_ENABLED = 1
@@ -530,8 +538,9 @@ _HELLO = struct.Struct("<HIBI")
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """Handshake. Repeated with the running session it changes nothing, so it may be
-    retransmitted.
+    """Handshake.
+
+    Repeated with the running session it changes nothing, so it may be retransmitted.
 
     Attributes
     ----------
@@ -587,7 +596,9 @@ _STOP = struct.Struct("<B")
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Freeze now. Acted on as soon as the frame is valid, ahead of everything queued.
+    """Freeze now.
+
+    Acted on as soon as the frame is valid, ahead of everything queued.
 
     Attributes
     ----------
@@ -804,7 +815,7 @@ class Enable:
     RELIABLE: ClassVar[bool] = True
     SIZE: ClassVar[int] = 8
 
-    pulse_ticks: tuple[int, int, int, int]
+    pulse_ticks: Ticks
 
     def pack(self) -> bytes:
         """Return the bytes on the wire; ValueError where a field is out of range."""
@@ -887,7 +898,7 @@ class Relax:
     SIZE: ClassVar[int] = 10
 
     slew_ticks: int
-    free_ticks: tuple[int, int, int, int]
+    free_ticks: Ticks
 
     def pack(self) -> bytes:
         """Return the bytes on the wire; ValueError where a field is out of range."""
@@ -917,7 +928,9 @@ _LIMP = struct.Struct("<B")
 
 @dataclass(frozen=True, slots=True)
 class Limp:
-    """Switch the pulses off at the end of this servo frame. Works in every state.
+    """Switch the pulses off at the end of this servo frame.
+
+    Works in every state.
 
     Attributes
     ----------
@@ -965,7 +978,7 @@ class Segment:
     """
 
     duration_frames: int
-    target_ticks: tuple[int, int, int, int]
+    target_ticks: Ticks
 
 
 _SEGMENTS = struct.Struct("<2B25H")
@@ -1023,7 +1036,13 @@ class Segments:
         return cls(
             v[0],
             v[1],
-            (Segment(v[2], v[3:7]), Segment(v[7], v[8:12]), Segment(v[12], v[13:17]), Segment(v[17], v[18:22]), Segment(v[22], v[23:27])),
+            (
+                Segment(v[2], v[3:7]),
+                Segment(v[7], v[8:12]),
+                Segment(v[12], v[13:17]),
+                Segment(v[17], v[18:22]),
+                Segment(v[22], v[23:27]),
+            ),
         )
 
 
@@ -1032,8 +1051,9 @@ _GUARDMESSAGE = struct.Struct("<BIBHB5H")
 
 @dataclass(frozen=True, slots=True)
 class GuardMessage:
-    """Take the baseline, then watch for a contact. Only while holding. Segments sent after it
-    wait until it is armed.
+    """Take the baseline, then watch for a contact.
+
+    Only while holding. Segments sent after it wait until it is armed.
 
     Attributes
     ----------
@@ -1062,7 +1082,7 @@ class GuardMessage:
     consecutive: int
     deadline_frames: int
     reflex: Reflex
-    retract_ticks: tuple[int, int, int, int]
+    retract_ticks: Ticks
     retract_slew_ticks: int
 
     def pack(self) -> bytes:
@@ -1143,7 +1163,9 @@ _SETLIMITS = struct.Struct("<9H8hIH")
 
 @dataclass(frozen=True, slots=True)
 class SetLimits:
-    """Set the limits. Only while relaxed; inside the compiled-in bounds.
+    """Set the limits.
+
+    Only while relaxed; inside the compiled-in bounds.
 
     Attributes
     ----------
@@ -1171,8 +1193,8 @@ class SetLimits:
     RELIABLE: ClassVar[bool] = True
     SIZE: ClassVar[int] = 40
 
-    pulse_min_ticks: tuple[int, int, int, int]
-    pulse_max_ticks: tuple[int, int, int, int]
+    pulse_min_ticks: Ticks
+    pulse_max_ticks: Ticks
     slew_ticks: int
     pair_sum_min_ticks: tuple[int, int]
     pair_sum_max_ticks: tuple[int, int]
@@ -1267,7 +1289,7 @@ class HelloReply:
     reset_cause: int
     limits_crc: int
     pose_known: int
-    pulse_ticks: tuple[int, int, int, int]
+    pulse_ticks: Ticks
     sensor: int
 
     def pack(self) -> bytes:
@@ -1464,7 +1486,7 @@ class Telemetry:
 
     frame: int
     phase_us: int
-    pulse_ticks: tuple[int, int, int, int]
+    pulse_ticks: Ticks
     attached: int
     queued: int
     guard: Guard
@@ -1522,7 +1544,11 @@ class Telemetry:
             Sensor(v[10]),
             v[11],
             v[12],
-            (Sample(v[13], v[14]), Sample(v[15], v[16]), Sample(v[17], v[18])),
+            (
+                Sample(v[13], v[14]),
+                Sample(v[15], v[16]),
+                Sample(v[17], v[18]),
+            ),
             v[19],
             v[20],
             v[21],
@@ -1564,7 +1590,7 @@ class Trip:
     sample_phase_us: int
     pressure_raw: int
     baseline_raw: int
-    pulse_ticks: tuple[tuple[int, int, int, int], tuple[int, int, int, int], tuple[int, int, int, int], tuple[int, int, int, int]]
+    pulse_ticks: tuple[Ticks, Ticks, Ticks, Ticks]
 
     def pack(self) -> bytes:
         """Return the bytes on the wire; ValueError where a field is out of range."""
@@ -1634,7 +1660,7 @@ class FaultMessage:
     detail: int
     frame: int
     phase_us: int
-    pulse_ticks: tuple[int, int, int, int]
+    pulse_ticks: Ticks
 
     def pack(self) -> bytes:
         """Return the bytes on the wire; ValueError where a field is out of range."""
@@ -1770,8 +1796,8 @@ class Limits:
     RELIABLE: ClassVar[bool] = False
     SIZE: ClassVar[int] = 40
 
-    pulse_min_ticks: tuple[int, int, int, int]
-    pulse_max_ticks: tuple[int, int, int, int]
+    pulse_min_ticks: Ticks
+    pulse_max_ticks: Ticks
     slew_ticks: int
     pair_sum_min_ticks: tuple[int, int]
     pair_sum_max_ticks: tuple[int, int]
