@@ -1,0 +1,61 @@
+"""The paper's own results, for comparison. The numbers live in ``paper.json``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib import resources
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperTrial:
+    """One trial of the paper's tube exploration.
+
+    Attributes
+    ----------
+    obstacle_below_tip_mm
+        Distance from the compressed bristle's tip at the start down to the
+        cube's top; None in the trial without an obstacle.
+    descent_mm
+        Where the arm ended its way down.
+    contact
+        Whether a contact was detected.
+    """
+
+    obstacle_below_tip_mm: float | None
+    descent_mm: float
+    contact: bool
+
+
+def trials() -> tuple[PaperTrial, ...]:
+    """All trials that the paper reports.
+
+    Examples
+    --------
+    >>> [trial.descent_mm for trial in trials()]
+    [40, 60, 80, 100, 100]
+    """
+    return tuple(PaperTrial(**trial) for trial in _data()["trials"])
+
+
+def trial_like(obstacle_below_tip_mm: float | None) -> PaperTrial | None:
+    """Return the paper's trial with this obstacle; None where it has none."""
+    for trial in trials():
+        theirs = trial.obstacle_below_tip_mm
+        if theirs is None or obstacle_below_tip_mm is None:
+            if theirs is obstacle_below_tip_mm:
+                return trial
+        elif abs(theirs - obstacle_below_tip_mm) < 0.5:
+            return trial
+    return None
+
+
+def source() -> str:
+    """Where the numbers come from."""
+    return str(_data()["source"])
+
+
+def _data() -> dict[str, list[dict[str, float | bool | None]]]:
+    text = resources.files("setae.report").joinpath("paper.json").read_text(encoding="utf-8")
+    data: dict[str, list[dict[str, float | bool | None]]] = json.loads(text)
+    return data

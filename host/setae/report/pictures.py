@@ -1,0 +1,479 @@
+"""Still pictures and the animation of a run, as files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from setae.report import drawing, extras, palette
+from setae.report.drawing import View
+from setae.report.tables import compare
+from setae.report.trial import Contact, Direction, Level, Trial
+
+VIEW = View()
+HALF_DEG = 62.0
+FLOOR_BELOW_MM = 30.0
+TOP_MM = 118.0
+
+_STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.5,
+    "text.color": palette.INK,
+    "axes.labelcolor": palette.INK,
+    "axes.edgecolor": palette.MUTED,
+    "axes.linewidth": 0.8,
+    "axes.titlesize": 12,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.color": palette.MUTED,
+    "ytick.color": palette.MUTED,
+    "figure.facecolor": palette.PAPER,
+    "savefig.facecolor": palette.PAPER,
+    "svg.hashsalt": "setae",
+}
+
+
+def _figure(width_in: float, height_in: float) -> Any:
+    """Make a figure that no window system knows of."""
+    backend = extras.load("matplotlib.backends.backend_agg")
+    figure = extras.load("matplotlib.figure").Figure(figsize=(width_in, height_in))
+    backend.FigureCanvasAgg(figure)
+    return figure
+
+
+def _style() -> Any:
+    return extras.load("matplotlib").rc_context(_STYLE)
+
+
+def _save(figure: Any, path: Path, dpi: int = 160) -> None:
+    # No version of matplotlib in the file: the same run gives the same bytes.
+    figure.savefig(path, dpi=dpi, metadata={"Software": None})
+
+
+def origin_note(trials: Sequence[Trial]) -> str:
+    """Say where the data come from, in one line."""
+    metadata = trials[0].log.metadata
+    if not trials[0].simulated:
+        return "measured on the robot"
+    seed = metadata.get("seed")
+    return "simulated" if seed is None else f"simulated, seed {seed}"
+
+
+# ------------------------------------------------------------------------ the robot
+
+
+def moment(trial: Trial) -> tuple[int, Contact | None]:
+    """Choose the index in `Motion` that shows most: a touch, else a reach to the side."""
+    motion = trial.motion
+    assert motion is not None
+    if trial.contacts:
+        return motion.at(trial.contacts[0].time_us), trial.contacts[0]
+    sideways = np.linalg.norm(motion.filament_mm[:, 1, :2] - motion.arm_mm[:, :2], axis=1)
+    deep = motion.arm_mm[:, 2] <= motion.arm_mm[:, 2].min() + 1.0
+    return int(np.argmax(np.where(deep, sideways, -1.0))), None
+
+
+def floor_mm(trials: Sequence[Trial]) -> float:
+    """Lowest height that a picture of these trials must show."""
+    lowest = [-150.0]
+    for trial in trials:
+        if trial.motion is not None:
+            lowest.append(float(trial.motion.filament_mm[:, 1, 2].min()))
+        if trial.cube is not None:
+            lowest.append(trial.cube.centre_mm[2] - trial.cube.edge_mm / 2)
+    return min(lowest) - FLOOR_BELOW_MM
+
+
+def draw_scene(
+    axes: Any, trial: Trial, index: int, floor: float, touched: Sequence[Contact], *, scale: float
+) -> None:
+    """Draw one moment of a trial: tube, cube, arm, robot and the touches so far."""
+    motion = trial.motion
+    assert motion is not None
+    if trial.tube is not None:
+        drawing.tube(axes, VIEW, trial.tube, floor, 10.0, HALF_DEG)
+    if trial.cube is not None:
+        drawing.cube(axes, VIEW, trial.cube)
+    drawing.robot(
+        axes, VIEW, motion.backbone_mm[index], motion.filament_mm[index], scale=scale
+    )
+    drawing.holder(axes, VIEW, motion.arm_mm[index])
+    for contact in touched:
+        drawing.contact(axes, VIEW, contact, scale=scale)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def robot_picture(path: Path, trial: Trial, *, title: bool = True) -> None:
+    """Draw the robot at its first touch, the parts named."""
+    motion = trial.motion
+    if motion is None:
+        return
+    index, contact = moment(trial)
+    floor = floor_mm([trial])
+    with _style():
+        figure = _figure(9.0, 7.4)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 0.9 if title else 1.0))
+        draw_scene(axes, trial, index, floor, [contact] if contact else [], scale=1.25)
+        _name_parts(axes, trial, index, contact)
+        _frame(axes, trial, floor)
+        if title:
+            heading = (
+                "The bristle touches the obstacle"
+                if contact
+                else f"Feeling around at {trial.descent_mm:.0f} mm of descent"
+            )
+            figure.text(0.04, 0.945, heading, fontsize=17, weight="bold", va="center")
+            figure.text(
+                0.04, 0.905, f"Trial {trial.number}, {origin_note([trial])}. Lengths are to scale.",
+                fontsize=10.5, color=palette.MUTED, va="center",
+            )  # fmt: skip
+        _save(figure, path)
+
+
+def _frame(axes: Any, trial: Trial, floor: float) -> None:
+    corners = np.array([[0.0, 0.0, floor], [0.0, 0.0, TOP_MM]])
+    if trial.tube is not None:
+        from setae.report import shapes
+
+        wall = shapes.shell(trial.tube, floor, 10.0, half_deg=HALF_DEG).reshape(-1, 3)
+        corners = np.concatenate([corners, wall])
+    flat = VIEW.flat(corners)
+    axes.set_xlim(flat[:, 0].min() - 6, flat[:, 0].max() + 6)
+    axes.set_ylim(flat[:, 1].min() - 6, flat[:, 1].max() + 6)
+
+
+def _name_parts(axes: Any, trial: Trial, index: int, contact: Contact | None) -> None:
+    motion = trial.motion
+    assert motion is not None
+    arm, backbone = motion.arm_mm[index], motion.backbone_mm[index]
+    filament = motion.filament_mm[index]
+    names: list[tuple[str, Any, tuple[float, float]]] = [
+        ("robot arm", arm + [0, 0, drawing.HOLDER_HEIGHT_MM + 14], (-92, 4)),
+        ("holder with four servos", arm + [0, 0, 42], (-120, 0)),
+        ("spring and four tendons", backbone[9], (-118, 0)),
+        ("bristle", filament.mean(axis=0), (-92, -12)),
+    ]
+    if contact is not None:
+        names.append((f"touch: {contact.change_hpa:+.0f} hPa", contact.true_point_mm, (70, 52)))
+    if trial.cube is not None:
+        low = np.array(trial.cube.centre_mm) - [trial.cube.edge_mm / 2, 0, trial.cube.edge_mm / 3]
+        names.append((f"cube, {trial.cube.edge_mm:.0f} mm", low, (-104, -26)))
+    for text, point, offset in names:
+        if not np.isfinite(point).all():
+            continue
+        axes.annotate(
+            text,
+            VIEW.flat(np.asarray(point)),
+            xytext=offset,
+            textcoords="offset points",
+            ha="right" if offset[0] < 0 else "left",
+            va="center",
+            fontsize=11,
+            color=palette.CONTACT if text.startswith("touch") else palette.INK,
+            weight="bold" if text.startswith("touch") else "normal",
+            bbox={"boxstyle": "round,pad=0.25", "fc": "white", "ec": "none", "alpha": 0.8},
+            arrowprops={"arrowstyle": "-", "color": palette.MUTED, "lw": 0.9, "shrinkB": 3},
+            zorder=9,
+        )
+
+
+# -------------------------------------------------------------------------- pressure
+
+
+def pressure_picture(path: Path, trial: Trial) -> None:
+    """Pressure over a trial, and a closer look at the level where it ended."""
+    level = next(
+        (level for level in trial.levels if any(d.touched for d in level.directions)),
+        trial.levels[-1] if trial.levels else None,
+    )
+    with _style():
+        figure = _figure(11.0, 6.6)
+        whole, close = figure.subplots(2, 1, height_ratios=(1.0, 1.25))
+        figure.subplots_adjust(left=0.075, right=0.985, top=0.86, bottom=0.085, hspace=0.42)
+        figure.text(0.02, 0.955, "What the bristle felt", fontsize=17, weight="bold", va="center")
+        figure.text(
+            0.02, 0.915,
+            f"Trial {trial.number}, {origin_note([trial])}. A touch is a change of more than "
+            f"{trial.threshold_hpa:g} hPa against the pressure just before the bristle reaches out.",
+            fontsize=10.5, color=palette.MUTED, va="center",
+        )  # fmt: skip
+        _pressure_axes(whole, trial, trial.start_us, trial.end_us)
+        for step in trial.levels:
+            whole.annotate(
+                f"{step.descent_mm:.0f} mm",
+                (float(trial.seconds((step.start_us + step.end_us) / 2)), 1.02),
+                xycoords=("data", "axes fraction"),
+                ha="center",
+                fontsize=9.5,
+                color=palette.MUTED,
+            )
+        whole.set_title("The whole trial; above: how deep the arm was", pad=20)
+        if level is not None:
+            _pressure_axes(close, trial, level.start_us, level.end_us)
+            for direction in level.directions:
+                _name_direction(close, trial, direction)
+            close.set_title(f"At {level.descent_mm:.0f} mm of descent", pad=20)
+        close.set_xlabel("time since the trial began (s)")
+        _save(figure, path)
+
+
+def _name_direction(axes: Any, trial: Trial, direction: Direction) -> None:
+    axes.annotate(
+        f"{direction.alpha_deg:.0f}°",
+        (float(trial.seconds((direction.start_us + direction.end_us) / 2)), 1.02),
+        xycoords=("data", "axes fraction"),
+        ha="center",
+        fontsize=9.5,
+        weight="bold" if direction.touched else "normal",
+        color=palette.CONTACT if direction.touched else palette.MUTED,
+    )
+
+
+def _pressure_axes(axes: Any, trial: Trial, start_us: int, end_us: int) -> None:
+    log = trial.log
+    times_us = log.times_us("/pressure")
+    within = np.flatnonzero((times_us >= start_us) & (times_us <= end_us))
+    within = within[np.argsort(times_us[within], kind="stable")]
+    seconds = trial.seconds(times_us[within])
+    pressure = log.array("/pressure", "pressure_hpa")[within]
+    baseline = log.array("/pressure", "baseline_hpa")[within]
+    armed = log.array("/pressure", "armed")[within].astype(bool)
+    for level in trial.levels:
+        for direction in level.directions:
+            if direction.end_us >= start_us and direction.start_us <= end_us:
+                axes.axvspan(
+                    *trial.seconds([direction.start_us, direction.end_us]),
+                    color=palette.direction(direction.alpha_deg),
+                    linewidth=0,
+                    zorder=0,
+                )
+    axes.fill_between(
+        seconds,
+        np.where(armed, baseline - trial.threshold_hpa, np.nan),
+        np.where(armed, baseline + trial.threshold_hpa, np.nan),
+        color=palette.INK,
+        alpha=0.10,
+        linewidth=0,
+        label=f"baseline ± {trial.threshold_hpa:g} hPa while watching",
+        zorder=1,
+    )
+    axes.plot(seconds, pressure, color=palette.PRESSURE, linewidth=0.9, label="pressure", zorder=2)
+    shown = [c for c in trial.contacts if start_us <= c.time_us <= end_us]
+    if shown:
+        axes.scatter(
+            [float(trial.seconds(c.time_us)) for c in shown],
+            [c.pressure_hpa for c in shown],
+            s=46,
+            color=palette.CONTACT,
+            edgecolors="white",
+            linewidths=1.0,
+            label="touch",
+            zorder=4,
+        )
+    axes.set_xlim(*trial.seconds([start_us, end_us]))
+    axes.set_ylabel("pressure (hPa)")
+    axes.ticklabel_format(useOffset=False)
+    axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none", ncols=3)
+
+
+# ------------------------------------------------------------------- where it touched
+
+
+def directions_picture(path: Path, trials: Sequence[Trial]) -> None:
+    """Draw, per trial, a rose of the directions felt at each depth; red where it touched."""
+    depths = sorted({level.descent_mm for trial in trials for level in trial.levels})
+    with _style():
+        figure = _figure(2.75 * max(len(trials), 2) + 0.5, 4.3)
+        figure.text(0.02, 0.94, "Where the bristle touched", fontsize=17, weight="bold")
+        figure.text(
+            0.02, 0.875,
+            "Looking down the tube. One ring a depth, the outermost the deepest; one sector a "
+            f"direction α. {origin_note(trials).capitalize()}.",
+            fontsize=10.5, color=palette.MUTED,
+        )  # fmt: skip
+        width = 1.0 / len(trials)
+        for position, trial in enumerate(trials):
+            axes = figure.add_axes(
+                (position * width + 0.08 * width, 0.1, 0.84 * width, 0.62), projection="polar"
+            )
+            _rose(axes, trial, depths)
+            below = trial.obstacle_below_tip_mm
+            label = "no obstacle" if below is None else f"obstacle {below:.0f} mm below"
+            figure.text(
+                (position + 0.5) * width, 0.775, f"Trial {trial.number}: {label}",
+                ha="center", fontsize=10.5, weight="bold",
+            )  # fmt: skip
+        _legend(figure)
+        _save(figure, path)
+
+
+def _legend(figure: Any) -> None:
+    patches = extras.load("matplotlib.patches")
+    figure.legend(
+        handles=[
+            patches.Patch(color=palette.CONTACT, label="touched"),
+            patches.Patch(color=palette.CLEAR, label="felt, nothing there"),
+            patches.Patch(fc="white", ec="#c5ced6", ls="--", label="not reached: stopped before"),
+        ],
+        loc="lower center",
+        ncols=3,
+        frameon=False,
+    )
+
+
+def _rose(axes: Any, trial: Trial, depths: Sequence[float]) -> None:
+    by_depth = {level.descent_mm: level for level in trial.levels}
+    alphas = sorted({d.alpha_deg for level in trial.levels for d in level.directions})
+    width = 2 * np.pi / max(len(alphas), 1)
+    # Seen from above with the world's x to the right, frame D's α runs clockwise.
+    axes.set_theta_direction(-1)
+    for ring, depth in enumerate(depths):
+        level: Level | None = by_depth.get(depth)
+        felt = {d.alpha_deg: d.touched for d in level.directions} if level else {}
+        for alpha in alphas:
+            touched = felt.get(alpha)
+            axes.bar(
+                np.radians(alpha),
+                0.9,
+                width * 0.94,
+                bottom=ring + 1.2,
+                color="white" if touched is None else palette.CONTACT if touched else palette.CLEAR,
+                edgecolor="#d5dce2" if touched is None else "white",
+                linestyle="--" if touched is None else "-",
+                linewidth=0.7,
+            )
+        axes.text(
+            np.radians(22.5), ring + 1.65, f"{depth:.0f}", fontsize=6.5, ha="center", va="center",
+            color=palette.MUTED,
+        )  # fmt: skip
+    axes.set_ylim(0, len(depths) + 1.3)
+    axes.set_yticks([])
+    axes.set_xticks(np.radians(alphas), [f"{alpha:.0f}°" for alpha in alphas], fontsize=7.5)
+    axes.tick_params(pad=-2)
+    axes.grid(visible=False)
+    axes.spines["polar"].set_visible(False)
+
+
+# -------------------------------------------------------------- beside the paper
+
+
+def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
+    """Show how far down each trial went, beside the paper's."""
+    rows = compare(trials)
+    with _style():
+        figure = _figure(9.0, 1.6 + 0.72 * len(rows))
+        axes = figure.add_axes((0.22, 0.17, 0.745, 0.62))
+        figure.text(
+            0.02, 0.935, "How deep it went before it stopped", fontsize=17, weight="bold",
+            va="center",
+        )  # fmt: skip
+        figure.text(
+            0.02, 0.86, f"This run ({origin_note(trials)}) beside the paper's experiment.",
+            fontsize=10.5, color=palette.MUTED, va="center",
+        )  # fmt: skip
+        for row, item in enumerate(rows):
+            trial = item.trial
+            colour = palette.CONTACT if trial.touched else palette.PRESSURE
+            axes.barh(row, trial.descent_mm, height=0.36, color=colour, alpha=0.88, zorder=2)
+            axes.text(
+                trial.descent_mm + 1.5, row, f"{trial.descent_mm:.0f} mm",
+                va="center", weight="bold", color=colour,
+            )  # fmt: skip
+            if item.theirs is not None:
+                axes.plot(
+                    [item.theirs.descent_mm] * 2, [row - 0.36, row + 0.36], color=palette.INK,
+                    linewidth=2.4, zorder=3,
+                )  # fmt: skip
+        axes.set_yticks(
+            range(len(rows)),
+            [
+                "no obstacle"
+                if row.trial.obstacle_below_tip_mm is None
+                else f"obstacle {row.trial.obstacle_below_tip_mm:.0f} mm below"
+                for row in rows
+            ],
+            color=palette.INK,
+        )
+        axes.tick_params(axis="y", length=0)
+        axes.invert_yaxis()
+        axes.set_xlim(0, 1.18 * max(row.trial.descent_mm for row in rows))
+        axes.set_xlabel("descent of the arm (mm)")
+        axes.grid(axis="x", color=palette.GRID, zorder=0)
+        axes.spines["left"].set_visible(False)
+        patches = extras.load("matplotlib.patches")
+        lines = extras.load("matplotlib.lines")
+        figure.legend(
+            handles=[
+                patches.Patch(color=palette.CONTACT, label="stopped by a touch"),
+                patches.Patch(color=palette.PRESSURE, label="no touch, all steps"),
+                lines.Line2D([], [], color=palette.INK, lw=2.4, label="the paper's robot"),
+            ],
+            loc="upper right",
+            bbox_to_anchor=(0.985, 0.985),
+            frameon=False,
+            fontsize=9.5,
+        )
+        _save(figure, path)
+
+
+# ------------------------------------------------------------------------ animation
+
+
+def animation(path: Path, trial: Trial, *, frames: int = 110, width_px: int = 620) -> None:
+    """Write an animated GIF: the way down, then the level where it ended in detail."""
+    motion = trial.motion
+    if motion is None:
+        return
+    image = extras.load("PIL.Image")
+    floor = floor_mm([trial])
+    images = []
+    with _style():
+        for index in _story(trial, frames):
+            figure = _figure(5.2, 5.2)
+            axes = figure.add_axes((0.0, 0.0, 1.0, 0.93))
+            now_us = int(motion.time_us[index])
+            touched = [c for c in trial.contacts if c.time_us <= now_us]
+            draw_scene(axes, trial, index, floor, touched, scale=0.9)
+            _frame(axes, trial, floor)
+            descent = -motion.arm_mm[index, 2] + motion.arm_mm[0, 2]
+            figure.text(
+                0.03, 0.955, f"{descent:3.0f} mm down", fontsize=13, weight="bold", va="center"
+            )
+            figure.text(
+                0.97, 0.955,
+                "touch!" if touched and now_us - touched[-1].time_us < 1_500_000 else
+                origin_note([trial]).split(",")[0],
+                fontsize=12, ha="right", va="center",
+                color=palette.CONTACT if touched else palette.MUTED,
+                weight="bold" if touched else "normal",
+            )  # fmt: skip
+            figure.set_dpi(width_px / 5.2)
+            figure.canvas.draw()
+            frame = image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
+            images.append(frame)
+    # One palette for all frames, or the background would flicker.
+    base = images[len(images) // 2].quantize(colors=128, method=image.Quantize.MEDIANCUT)
+    flat = [frame.quantize(palette=base, dither=image.Dither.NONE) for frame in images]
+    flat[0].save(
+        path, save_all=True, append_images=flat[1:], duration=90, loop=0, optimize=True
+    )
+
+
+def _story(trial: Trial, frames: int) -> list[int]:
+    """Indices of frames: little of the levels without a touch, more of the last."""
+    motion = trial.motion
+    assert motion is not None
+    if not trial.levels:
+        times = np.linspace(trial.start_us, trial.end_us, frames)
+        return [motion.at(float(time)) for time in times]
+    last = trial.levels[-1]
+    early = np.linspace(trial.start_us, last.start_us, int(frames * 0.45), endpoint=False)
+    late = np.linspace(last.start_us, last.end_us, int(frames * 0.45), endpoint=False)
+    home = np.linspace(last.end_us, trial.end_us, frames - len(early) - len(late))
+    return [motion.at(float(time)) for time in np.concatenate([early, late, home])]
