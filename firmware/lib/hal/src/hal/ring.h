@@ -19,7 +19,8 @@ class ByteRing {
  public:
   bool push(uint8_t byte) {
     const uint8_t head = head_;
-    if (static_cast<uint8_t>(head - tail_) >= kBytes) return false;
+    if (static_cast<uint8_t>(head - tail_) >= kBytes)
+      return false;
     bytes_[head & (kBytes - 1)] = byte;
     head_ = static_cast<uint8_t>(head + 1);
     return true;
@@ -27,7 +28,8 @@ class ByteRing {
 
   bool pop(uint8_t& byte) {
     const uint8_t tail = tail_;
-    if (tail == head_) return false;
+    if (tail == head_)
+      return false;
     byte = bytes_[tail & (kBytes - 1)];
     tail_ = static_cast<uint8_t>(tail + 1);
     return true;

@@ -6,7 +6,8 @@ constexpr uint16_t HostHal::kFreeTicks;
 
 HostHal::HostHal() {
   retained_.pose_known = true;
-  for (uint16_t& ticks : retained_.pulses.ticks) ticks = kFreeTicks;
+  for (uint16_t& ticks : retained_.pulses.ticks)
+    ticks = kFreeTicks;
 }
 
 BoardTime HostHal::to_board_time(uint64_t time_us) {
@@ -23,16 +24,19 @@ void HostHal::advance_to(uint64_t board_us) {
 }
 
 bool HostHal::push_rx(uint8_t byte) {
-  if (receive_.push(byte)) return true;
+  if (receive_.push(byte))
+    return true;
   ++rx_overruns_;
   return false;
 }
 
 void HostHal::push_sample(protocol::Sensor status, int32_t pressure_raw, uint64_t sampled_us) {
   sensor_ = status;
-  if (status != protocol::Sensor::kOk) return;
+  if (status != protocol::Sensor::kOk)
+    return;
   if (sample_count_ == kSamples) {  // the sensor overwrites what nobody read
-    for (uint8_t i = 1; i < kSamples; ++i) samples_[i - 1] = samples_[i];
+    for (uint8_t i = 1; i < kSamples; ++i)
+      samples_[i - 1] = samples_[i];
     --sample_count_;
   }
   samples_[sample_count_++] = {pressure_raw, sampled_us};
@@ -50,7 +54,8 @@ void HostHal::restart(protocol::ResetCause cause) {
 }
 
 void HostHal::write(const uint8_t* data, uint8_t size) {
-  for (uint8_t i = 0; i < size; ++i) transmit_.push(data[i]);
+  for (uint8_t i = 0; i < size; ++i)
+    transmit_.push(data[i]);
 }
 
 void HostHal::set_pulses(const Pulses& pulses, uint8_t attached) {
@@ -60,12 +65,14 @@ void HostHal::set_pulses(const Pulses& pulses, uint8_t attached) {
 
 SensorReading HostHal::read_sensor() {
   SensorReading reading = {sensor_, false, 0, {0, 0}};
-  if (sample_count_ == 0) return reading;
+  if (sample_count_ == 0)
+    return reading;
   reading.fresh = true;
   reading.pressure_raw = samples_[0].pressure_raw;
   reading.sampled = to_board_time(samples_[0].sampled_us);
   --sample_count_;
-  for (uint8_t i = 0; i < sample_count_; ++i) samples_[i] = samples_[i + 1];
+  for (uint8_t i = 0; i < sample_count_; ++i)
+    samples_[i] = samples_[i + 1];
   return reading;
 }
 

@@ -1,0 +1,219 @@
+#include "board/board.h"
+
+#include "board/default_limits.h"
+#include "protocol/flash.h"
+
+namespace setae {
+
+using protocol::Guard;
+using protocol::Refusal;
+
+namespace {
+
+// 22 mm/s of tendon.
+constexpr uint16_t kTimeoutSlewTicks = 16;
+
+constexpr protocol::SetLimits kInitialLimits SETAE_FLASH = kDefaultLimits;
+
+}  // namespace
+
+void Board::poll() {
+  if (!started_)
+    start();
+  const BoardTime now = hal_.now();
+  if (now.frame != now_.frame)
+    begin_frame(now);
+  now_ = now;
+  receive();
+  read_sensor();
+  report();
+}
+
+void Board::start() {
+  started_ = true;
+  now_ = hal_.now();
+  host_heard_frame_ = now_.frame;
+  sampled_frame_ = now_.frame;
+  const Retained& retained = hal_.retained();
+  if (retained.pose_known)
+    current_ = retained.pulses;
+  next_ = current_;
+  history_.fill(current_);
+
+  protocol::SetLimits initial;
+  protocol::flash_copy(&kInitialLimits, initial);
+  if (!limits_.set(initial).ok())
+    fault(protocol::Fault::kInternal, 0);
+
+  switch (hal_.reset_cause()) {
+    case protocol::ResetCause::kWatchdog:
+      fault(protocol::Fault::kWatchdog, 0);
+      break;
+    case protocol::ResetCause::kBrownOut:
+      fault(protocol::Fault::kSupplyLow, 0);
+      break;
+    default:
+      break;
+  }
+}
+
+void Board::begin_frame(const BoardTime& now) {
+  latch_frame(now);
+  check_consistency();
+  if (detector_.deadline_passed())
+    trip(protocol::TripCause::kDeadline);
+  watch_hold_timeout();
+  advance_motion();
+  put_out();
+}
+
+void Board::latch_frame(const BoardTime& now) {
+  now_ = now;
+  current_ = next_;
+  current_attached_ = attached_;
+  history_.add(current_);
+  Retained& retained = hal_.retained();
+  for (uint8_t i = 0; i < protocol::kServos; ++i) {
+    if ((current_attached_ >> i) & 1)
+      retained.pulses.ticks[i] = current_.ticks[i];
+  }
+  if (current_attached_ == kAllServos)
+    retained.pose_known = true;
+
+  trip_.on_frame();
+  fault_.on_frame();
+  refusal_.on_frame();
+  telemetry_wanted_ = session_.open();
+}
+
+// From the pulses of this frame to those of the next.
+void Board::advance_motion() {
+  switch (mode_) {
+    case Mode::kAttaching:
+      if (attacher_.step(attached_)) {
+        raise(Event::kAttached);
+        end_motion();
+      }
+      break;
+    case Mode::kPlaying:
+      if (!player_.step(next_)) {
+        ran_dry_ = true;
+        ran_dry_frame_ = now_.frame;
+        raise(Event::kQueueEmpty);
+        end_motion();
+      }
+      break;
+    case Mode::kUnwinding:
+      if (line_.running()) {
+        line_.step(next_);
+      } else {
+        raise(Event::kUnwound);
+        switch_off();
+      }
+      break;
+    case Mode::kReflex:
+      if (line_.running()) {
+        line_.step(next_);
+      } else {
+        raise(Event::kReflexDone);
+        end_motion();
+      }
+      break;
+    default:
+      break;
+  }
+}
+
+void Board::watch_hold_timeout() {
+  const uint32_t timeout_frames = limits_.hold_timeout_frames();
+  if (mode_ != Mode::kHolding || timeout_frames == 0)
+    return;
+  if (now_.frame - host_heard_frame_ < timeout_frames)
+    return;
+  raise(Event::kHoldTimeout);
+  drop_plans();
+  const uint16_t fastest = limits_.in_force().slew_ticks;
+  start_line(rest_pose_.ticks, kTimeoutSlewTicks < fastest ? kTimeoutSlewTicks : fastest);
+}
+
+void Board::put_out() {
+  if (attached_ == kAllServos && current_attached_ == kAllServos) {
+    limits_.constrain(current_, next_);
+  }
+  hal_.set_pulses(next_, attached_);
+}
+
+void Board::check_consistency() {
+  const bool moves = mode_ == Mode::kHolding || mode_ == Mode::kPlaying ||
+                     mode_ == Mode::kUnwinding || mode_ == Mode::kReflex;
+  const bool right =
+      (!moves || attached_ == kAllServos) && (mode_ != Mode::kRelaxed || attached_ == 0) &&
+      (detector_.guard() == Guard::kOff || mode_ == Mode::kHolding || mode_ == Mode::kPlaying);
+  if (!right && mode_ != Mode::kFault) {
+    fault(protocol::Fault::kInternal, static_cast<uint32_t>(mode_) << 8 | attached_);
+  }
+}
+
+Verdict Board::ask(Event event) const {
+  const Cell cell = look_up(mode_, event);
+  return cell.is_refusal() ? Verdict::refuse(cell.reason()) : Verdict::accept();
+}
+
+Verdict Board::raise(Event event) {
+  const Cell cell = look_up(mode_, event);
+  if (cell.is_refusal())
+    return Verdict::refuse(cell.reason());
+  if (cell.is_mode()) {
+    mode_ = cell.mode();
+  } else {
+    fault(protocol::Fault::kInternal,
+          0x10000UL | static_cast<uint16_t>(mode_) << 8 | static_cast<uint8_t>(event));
+  }
+  return Verdict::accept();
+}
+
+void Board::play_if_ready() {
+  if (player_.empty() || detector_.guard() == Guard::kTaring)
+    return;
+  if (mode_ == Mode::kHolding && detector_.guard() == Guard::kOff) {
+    detector_.coarse_on(limits_.coarse_threshold_raw());
+  }
+  raise(Event::kPlay);
+}
+
+void Board::freeze() {
+  // A frame may have begun since this poll did; its pulses are the ones to stay at.
+  const BoardTime now = hal_.now();
+  if (now.frame != now_.frame)
+    latch_frame(now);
+  next_ = current_;
+  hal_.set_pulses(next_, attached_);
+  end_motion();
+  drop_plans();
+}
+
+void Board::drop_plans() {
+  player_.clear();
+  detector_.guard_off();
+  ran_dry_ = false;
+  ++epoch_;
+}
+
+void Board::switch_off() {
+  attached_ = 0;
+  hal_.set_pulses(next_, attached_);
+  player_.clear();
+  end_motion();
+}
+
+void Board::end_motion() {
+  line_.cancel();
+  detector_.coarse_off();
+}
+
+void Board::start_line(const uint16_t* to_ticks, uint16_t slew_ticks) {
+  line_.start_at_slew(next_, to_ticks, slew_ticks);
+  detector_.coarse_on(limits_.coarse_threshold_raw());
+}
+
+}  // namespace setae

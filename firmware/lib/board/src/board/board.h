@@ -1,0 +1,163 @@
+// The board: messages and samples in, pulses and messages out. It never waits; call poll() as
+// often as possible.
+//
+// One class in four files, by what starts the work:
+//   board.cpp     time: the servo frame, the modes, what the pulses do next
+//   commands.cpp  the host: each message, checked and carried out
+//   safety.cpp    danger: sample to contact to stop, faults
+//   reports.cpp   what the host gets to know
+#pragma once
+
+#include <stdint.h>
+
+#include "board/pulse_history.h"
+#include "board/sample_log.h"
+#include "board/state_table.h"
+#include "contact/detector.h"
+#include "hal/hal.h"
+#include "link/latch.h"
+#include "link/receiver.h"
+#include "link/session.h"
+#include "link/transmitter.h"
+#include "motion/attacher.h"
+#include "motion/limits.h"
+#include "motion/line.h"
+#include "motion/player.h"
+#include "protocol/messages.h"
+
+namespace setae {
+
+class Board {
+ public:
+  // Touches no hardware: that begins with the first poll().
+  explicit Board(Hal& hal) : hal_(hal), transmitter_(hal) {}
+
+  void poll();
+
+  Mode mode() const { return mode_; }
+  uint8_t epoch() const { return epoch_; }
+
+ private:
+  // ---- board.cpp: time ----
+  void start();
+  void begin_frame(const BoardTime& now);
+  void advance_motion();
+  void watch_hold_timeout();
+  void put_out();
+  void check_consistency();
+
+  // Makes the pulses last set those of this frame.
+  void latch_frame(const BoardTime& now);
+
+  // What the state table says to an event.
+  Verdict ask(Event event) const;
+  // The same, and changes the mode unless the event is refused.
+  Verdict raise(Event event);
+  void play_if_ready();
+  // The servos stay where they are in this frame, and the plans are dropped.
+  void freeze();
+  // What is queued or guarded is forgotten. The new epoch tells it from what the host sent
+  // before it knew.
+  void drop_plans();
+  void switch_off();
+  void end_motion();
+  void start_line(const uint16_t* to_ticks, uint16_t slew_ticks);
+
+  // ---- commands.cpp: the host ----
+  void receive();
+  void handle_message();
+  void handle_hello();
+  void handle_stop();
+  void handle_reliable();
+  bool carry_out();
+  Verdict decide();
+  Verdict enable();
+  Verdict resume();
+  Verdict relax();
+  Verdict limp();
+  Verdict segments();
+  Verdict guard();
+  Verdict disarm();
+  Verdict set_limits();
+  Verdict check_segments(const protocol::Segments& message) const;
+  Verdict check_guard(const protocol::GuardMessage& message) const;
+  // Latches the refusal, and stops the motion where a motion was refused.
+  void refuse(protocol::MessageType type, uint8_t sequence, const Verdict& verdict);
+
+  // ---- safety.cpp: danger ----
+  void read_sensor();
+  void take_sample(const SensorReading& reading);
+  RestLevel::Follow rest_follow() const;
+  void refuse_tare(protocol::Refusal reason, uint32_t value, uint32_t limit);
+  void trip(protocol::TripCause cause);
+  void fault(protocol::Fault fault, uint32_t detail);
+  bool sensor_fault_persists() const;
+
+  // ---- reports.cpp: what the host gets to know ----
+  void report();
+  bool send_hello_reply();
+  bool send_limits();
+  bool send_pong();
+  bool send_telemetry();
+  template <typename Record>
+  void send_latched(Latch<Record>& latch);
+  protocol::BoardHeader header() const;
+
+  Hal& hal_;
+  Receiver receiver_;
+  Session session_;
+  Transmitter transmitter_;
+  Limits limits_;
+  Player player_;
+  Attacher attacher_;
+  Detector detector_;
+
+  // Time and motion.
+  bool started_ = false;
+  BoardTime now_ = {};
+  Mode mode_ = Mode::kRelaxed;
+  uint8_t epoch_ = 0;
+  Pulses current_ = {};  // put out in this frame
+  Pulses next_ = {};     // to be put out in the next one
+  uint8_t current_attached_ = 0;
+  uint8_t attached_ = 0;  // for the next frame
+  Line line_;             // unwinding and reflex
+  PulseHistory history_;
+  Pulses rest_pose_ = {};  // where the servos attached: a hold that timed out returns there
+  uint32_t host_heard_frame_ = 0;
+  uint32_t ran_dry_frame_ = 0;
+  bool ran_dry_ = false;
+  uint8_t underruns_ = 0;
+
+  // Guarded move.
+  protocol::Reflex reflex_ = protocol::Reflex::kHold;
+  uint16_t retract_ticks_[protocol::kServos] = {};
+  uint16_t retract_slew_ticks_ = 1;
+  uint8_t guard_sequence_ = 0;
+
+  // Sensor.
+  protocol::Sensor sensor_ = protocol::Sensor::kAbsent;
+  bool out_of_range_ = false;  // the last sample was
+  BoardTime sampled_ = {};     // the last sample
+  uint32_t sampled_frame_ = 0;
+  SampleLog samples_;
+
+  // Link.
+  bool stop_known_ = false;
+  uint8_t stop_number_ = 0;
+  uint8_t stop_session_ = 0;
+  uint32_t hello_token_ = 0;
+  uint32_t ping_token_ = 0;
+  bool hello_wanted_ = false;
+  bool receipt_wanted_ = false;
+  bool gap_ = false;
+  bool pong_wanted_ = false;
+  bool limits_wanted_ = false;
+  bool telemetry_wanted_ = false;
+
+  Latch<protocol::Trip> trip_;
+  Latch<protocol::FaultMessage> fault_;
+  Latch<protocol::RefusalMessage> refusal_;
+};
+
+}  // namespace setae

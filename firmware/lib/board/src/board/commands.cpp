@@ -1,0 +1,369 @@
+// What the host says: each message is checked, then carried out.
+#include "board/board.h"
+
+namespace setae {
+
+using protocol::Guard;
+using protocol::MessageType;
+using protocol::Refusal;
+
+namespace {
+
+// Bounds a poll: what came in 2.5 ms.
+constexpr uint8_t kBytesPerPoll = 64;
+// Segments that come this soon after the queue ran dry were meant to come before.
+constexpr uint8_t kUnderrunFrames = 5;
+
+}  // namespace
+
+void Board::receive() {
+  uint8_t byte;
+  for (uint8_t i = 0; i < kBytesPerPoll && hal_.read_byte(byte); ++i) {
+    if (!receiver_.push(byte))
+      continue;
+    handle_message();
+    report();
+  }
+}
+
+void Board::handle_message() {
+  const protocol::HostHeader& from = receiver_.header();
+  // A stop counts whoever sends it; hello is how a host gets its session.
+  if (receiver_.type() == MessageType::kStop)
+    return handle_stop();
+  if (receiver_.type() == MessageType::kHello)
+    return handle_hello();
+  if (from.session != session_.id())
+    return receiver_.count_stray();
+  host_heard_frame_ = now_.frame;
+
+  switch (receiver_.type()) {
+    case MessageType::kPing: {
+      protocol::Ping ping;
+      decode(receiver_.payload(), ping);
+      ping_token_ = ping.token;
+      pong_wanted_ = true;
+      return;
+    }
+    case MessageType::kRecall: {
+      protocol::Recall recall;
+      decode(receiver_.payload(), recall);
+      if (recall.record == static_cast<uint8_t>(protocol::Record::kTrip))
+        trip_.recall();
+      if (recall.record == static_cast<uint8_t>(protocol::Record::kFault))
+        fault_.recall();
+      if (recall.record == static_cast<uint8_t>(protocol::Record::kRefusal))
+        refusal_.recall();
+      return;
+    }
+    default:
+      break;
+  }
+  if (!session_.open())
+    return receiver_.count_stray();
+
+  switch (receiver_.type()) {
+    case MessageType::kAcknowledge: {
+      protocol::Acknowledge got;
+      decode(receiver_.payload(), got);
+      const protocol::Record record = static_cast<protocol::Record>(got.record);
+      if (record == protocol::Record::kTrip)
+        trip_.acknowledge(got.record_id);
+      if (record == protocol::Record::kFault)
+        fault_.acknowledge(got.record_id);
+      if (record == protocol::Record::kRefusal)
+        refusal_.acknowledge(got.record_id);
+      return;
+    }
+    case MessageType::kReadLimits:
+      limits_wanted_ = true;
+      return;
+    default:
+      return handle_reliable();
+  }
+}
+
+void Board::handle_hello() {
+  protocol::Hello hello;
+  decode(receiver_.payload(), hello);
+  hello_token_ = hello.token;
+  hello_wanted_ = true;
+  if (hello.new_session == 0 || hello.new_session == session_.id())
+    return;
+  // A host of another version learns it from the answer, and moves nothing.
+  if (hello.protocol_version != protocol::kProtocolVersion ||
+      hello.schema_hash != protocol::kSchemaHash) {
+    return;
+  }
+  session_.start(hello.new_session);
+  host_heard_frame_ = now_.frame;
+  stop_known_ = false;
+  receipt_wanted_ = false;
+  gap_ = false;
+  if (mode_ == Mode::kPlaying || mode_ == Mode::kUnwinding) {
+    freeze();
+  } else {
+    drop_plans();
+  }
+  raise(Event::kNewSession);
+}
+
+void Board::handle_stop() {
+  protocol::Stop stop;
+  decode(receiver_.payload(), stop);
+  receipt_wanted_ = true;
+  const uint8_t session = receiver_.header().session;
+  if (stop_known_ && stop.stop_number == stop_number_ && session == stop_session_)
+    return;
+  freeze();
+  raise(Event::kStop);
+  stop_known_ = true;
+  stop_number_ = stop.stop_number;
+  stop_session_ = session;
+}
+
+void Board::handle_reliable() {
+  receipt_wanted_ = true;
+  switch (session_.judge(receiver_.header().sequence)) {
+    case Session::Order::kNext:
+      if (carry_out())
+        session_.accept();
+      return;
+    case Session::Order::kOld:
+      return;
+    case Session::Order::kGap:
+      gap_ = true;
+      return;
+  }
+}
+
+// False where the command has to come again.
+bool Board::carry_out() {
+  const Verdict verdict = decide();
+  if (verdict.ok())
+    return true;
+  if (verdict.later || refusal_.pending())
+    return false;
+  refuse(receiver_.type(), receiver_.header().sequence, verdict);
+  return true;
+}
+
+void Board::refuse(MessageType type, uint8_t sequence, const Verdict& verdict) {
+  protocol::RefusalMessage record = {};
+  record.command_type = static_cast<uint8_t>(type);
+  record.command_sequence = sequence;
+  record.reason = static_cast<uint8_t>(verdict.reason);
+  record.index = verdict.index;
+  record.value = verdict.value;
+  record.limit = verdict.limit;
+  refusal_.set(record);
+
+  if (type != MessageType::kSegments && type != MessageType::kGuard)
+    return;
+  if (mode_ == Mode::kPlaying) {
+    freeze();
+  } else {
+    drop_plans();
+  }
+  raise(Event::kMotionRefused);
+}
+
+Verdict Board::decide() {
+  switch (receiver_.type()) {
+    case MessageType::kEnable:
+      return enable();
+    case MessageType::kResume:
+      return resume();
+    case MessageType::kRelax:
+      return relax();
+    case MessageType::kLimp:
+      return limp();
+    case MessageType::kSegments:
+      return segments();
+    case MessageType::kGuard:
+      return guard();
+    case MessageType::kDisarm:
+      return disarm();
+    case MessageType::kSetLimits:
+      return set_limits();
+    default:
+      return Verdict::refuse(Refusal::kBadField);
+  }
+}
+
+Verdict Board::enable() {
+  protocol::Enable message;
+  decode(receiver_.payload(), message);
+  Verdict verdict = ask(Event::kEnable);
+  if (verdict.ok())
+    verdict = limits_.check_pose(message.pulse_ticks);
+  if (!verdict.ok())
+    return verdict;
+
+  for (uint8_t i = 0; i < protocol::kServos; ++i)
+    next_.ticks[i] = message.pulse_ticks[i];
+  current_ = next_;
+  rest_pose_ = next_;
+  history_.fill(next_);
+  attacher_.start();
+  attacher_.step(attached_);
+  hal_.set_pulses(next_, attached_);
+  detector_.coarse_on(limits_.coarse_threshold_raw());
+  return raise(Event::kEnable);
+}
+
+Verdict Board::resume() {
+  protocol::Resume message;
+  decode(receiver_.payload(), message);
+  if (message.epoch != epoch_) {
+    return Verdict::refuse(Refusal::kWrongEpoch, kNoIndex, message.epoch, epoch_);
+  }
+  if ((mode_ == Mode::kTripped && trip_.pending()) || (mode_ == Mode::kFault && fault_.pending())) {
+    return Verdict::refuse(Refusal::kRecordPending);
+  }
+  if (mode_ == Mode::kFault && sensor_fault_persists()) {
+    return Verdict::refuse(Refusal::kFault, kNoIndex, fault_.record().fault);
+  }
+  const Mode before = mode_;
+  const Verdict verdict = raise(attached_ == 0            ? Event::kResumeDetached
+                                : attached_ == kAllServos ? Event::kResumeAttached
+                                                          : Event::kResumePartly);
+  if (mode_ == Mode::kAttaching && before != Mode::kAttaching)
+    attacher_.start();
+  return verdict;
+}
+
+Verdict Board::relax() {
+  protocol::Relax message;
+  decode(receiver_.payload(), message);
+  Verdict verdict = ask(Event::kRelax);
+  if (verdict.ok())
+    verdict = limits_.check_slew(message.slew_ticks);
+  if (verdict.ok())
+    verdict = limits_.check_pose(message.free_ticks);
+  if (!verdict.ok())
+    return verdict;
+
+  player_.clear();
+  detector_.guard_off();
+  verdict = raise(Event::kRelax);
+  if (mode_ == Mode::kUnwinding)
+    start_line(message.free_ticks, message.slew_ticks);
+  return verdict;
+}
+
+Verdict Board::limp() {
+  detector_.guard_off();
+  switch_off();
+  return raise(Event::kLimp);
+}
+
+Verdict Board::segments() {
+  protocol::Segments message;
+  decode(receiver_.payload(), message);
+  if (message.epoch != epoch_)
+    return Verdict::accept();  // discarded: it was sent too early
+  Verdict verdict = ask(Event::kSegments);
+  if (verdict.ok())
+    verdict = check_segments(message);
+  if (!verdict.ok())
+    return verdict;
+  if (message.count > player_.room())
+    return Verdict::wait();
+
+  if (ran_dry_ && now_.frame - ran_dry_frame_ <= kUnderrunFrames)
+    ++underruns_;
+  ran_dry_ = false;
+  for (uint8_t i = 0; i < message.count; ++i)
+    player_.push(message.segments[i]);
+  verdict = raise(Event::kSegments);
+  play_if_ready();
+  return verdict;
+}
+
+// All of them before any is queued.
+Verdict Board::check_segments(const protocol::Segments& message) const {
+  if (message.count == 0 || message.count > protocol::kSegmentsPerMessage) {
+    return Verdict::refuse(Refusal::kBadField, kNoIndex, message.count,
+                           protocol::kSegmentsPerMessage);
+  }
+  const uint16_t* from = player_.empty() ? next_.ticks : player_.end_ticks();
+  for (uint8_t i = 0; i < message.count; ++i) {
+    const protocol::Segment& segment = message.segments[i];
+    if (segment.duration_frames == 0)
+      return Verdict::refuse(Refusal::kBadField, i, 0, 1);
+    Verdict verdict = limits_.check_pose(segment.target_ticks);
+    if (verdict.ok()) {
+      verdict = limits_.check_line(from, segment.target_ticks, segment.duration_frames, i);
+    }
+    if (!verdict.ok())
+      return verdict;
+    from = segment.target_ticks;
+  }
+  return Verdict::accept();
+}
+
+Verdict Board::guard() {
+  protocol::GuardMessage message;
+  decode(receiver_.payload(), message);
+  if (message.epoch != epoch_)
+    return Verdict::accept();
+  Verdict verdict = ask(Event::kGuard);
+  if (verdict.ok() && !player_.empty())
+    verdict = Verdict::refuse(Refusal::kBusy);
+  if (verdict.ok())
+    verdict = check_guard(message);
+  if (verdict.ok() && trip_.pending())
+    verdict = Verdict::refuse(Refusal::kRecordPending);
+  if (verdict.ok() && sensor_ != protocol::Sensor::kOk) {
+    verdict = Verdict::refuse(Refusal::kSensorUnavailable, kNoIndex, static_cast<uint8_t>(sensor_));
+  }
+  if (!verdict.ok())
+    return verdict;
+
+  reflex_ = static_cast<protocol::Reflex>(message.reflex);
+  for (uint8_t i = 0; i < protocol::kServos; ++i)
+    retract_ticks_[i] = message.retract_ticks[i];
+  retract_slew_ticks_ = message.retract_slew_ticks;
+  guard_sequence_ = receiver_.header().sequence;
+  detector_.guard_move(message.threshold_raw, message.consecutive, message.deadline_frames);
+  return raise(Event::kGuard);
+}
+
+Verdict Board::check_guard(const protocol::GuardMessage& message) const {
+  if (message.threshold_raw == 0 || message.consecutive == 0 || message.consecutive > 8 ||
+      message.deadline_frames == 0 || message.reflex >= protocol::kReflexCount) {
+    return Verdict::refuse(Refusal::kBadField);
+  }
+  // A guard that is blinder than unguarded motion is none.
+  const uint32_t coarse_raw = limits_.coarse_threshold_raw();
+  if (coarse_raw != 0 && message.threshold_raw > coarse_raw) {
+    return Verdict::refuse(Refusal::kOutOfLimits, kNoIndex,
+                           static_cast<int32_t>(message.threshold_raw),
+                           static_cast<int32_t>(coarse_raw));
+  }
+  if (message.reflex == static_cast<uint8_t>(protocol::Reflex::kHold))
+    return Verdict::accept();
+  const Verdict verdict = limits_.check_slew(message.retract_slew_ticks);
+  return verdict.ok() ? limits_.check_pose(message.retract_ticks) : verdict;
+}
+
+Verdict Board::disarm() {
+  const Verdict verdict = ask(Event::kDisarm);
+  if (!verdict.ok())
+    return verdict;
+  // Segments that wait for the guard must not run without it.
+  if (mode_ == Mode::kHolding && !player_.empty())
+    return Verdict::refuse(Refusal::kBusy);
+  detector_.guard_off();
+  return raise(Event::kDisarm);
+}
+
+Verdict Board::set_limits() {
+  protocol::SetLimits message;
+  decode(receiver_.payload(), message);
+  const Verdict verdict = ask(Event::kSetLimits);
+  return verdict.ok() ? limits_.set(message) : verdict;
+}
+
+}  // namespace setae

@@ -1,0 +1,106 @@
+// What the host gets to know. Each message waits as a flag until the line has room for all of
+// it, the urgent ones first; what is on its way can't be overtaken, so little is written ahead.
+#include "board/board.h"
+#include "board/time.h"
+#include "board/version.h"
+#include "protocol/crc32c.h"
+
+namespace setae {
+
+void Board::report() {
+  if (hello_wanted_ && send_hello_reply())
+    hello_wanted_ = false;
+  if (receipt_wanted_) {
+    const protocol::Receipt receipt = {gap_};
+    if (transmitter_.send(header(), receipt))
+      receipt_wanted_ = gap_ = false;
+  }
+  if (pong_wanted_ && send_pong())
+    pong_wanted_ = false;
+  send_latched(trip_);
+  send_latched(fault_);
+  send_latched(refusal_);
+  if (telemetry_wanted_ && send_telemetry())
+    telemetry_wanted_ = false;
+  if (limits_wanted_ && send_limits())
+    limits_wanted_ = false;
+}
+
+template <typename Record>
+void Board::send_latched(Latch<Record>& latch) {
+  if (latch.wanted(session_.open()) && transmitter_.send(header(), latch.record()))
+    latch.sent();
+}
+
+protocol::BoardHeader Board::header() const {
+  protocol::BoardHeader header = {};
+  header.session = session_.id();
+  header.expected = session_.expected();
+  header.credit = player_.room();
+  header.epoch = epoch_;
+  header.state = static_cast<uint8_t>(state_of(mode_));
+  return header;
+}
+
+bool Board::send_hello_reply() {
+  protocol::HelloReply reply = {};
+  reply.protocol_version = protocol::kProtocolVersion;
+  reply.schema_hash = protocol::kSchemaHash;
+  reply.token = hello_token_;
+  reply.firmware_major = kFirmwareMajor;
+  reply.firmware_minor = kFirmwareMinor;
+  reply.firmware_patch = kFirmwarePatch;
+  reply.previous_session = session_.previous();
+  reply.reset_cause = static_cast<uint8_t>(hal_.reset_cause());
+  uint8_t limits[protocol::SetLimits::kSize];
+  encode(limits_.in_force(), limits);
+  reply.limits_crc = protocol::crc32c(limits, sizeof(limits));
+  reply.pose_known = hal_.retained().pose_known;
+  for (uint8_t i = 0; i < protocol::kServos; ++i) {
+    reply.pulse_ticks[i] = hal_.retained().pulses.ticks[i];
+  }
+  reply.sensor = static_cast<uint8_t>(sensor_);
+  return transmitter_.send(header(), reply);
+}
+
+bool Board::send_limits() {
+  protocol::Limits reply = {};
+  static_cast<protocol::SetLimits&>(reply) = limits_.in_force();
+  return transmitter_.send(header(), reply);
+}
+
+bool Board::send_pong() {
+  // The moment of answering, not of asking: the host halves the round trip.
+  const BoardTime now = hal_.now();
+  const protocol::Pong pong = {ping_token_, now.frame, now.phase_us};
+  return transmitter_.send(header(), pong);
+}
+
+bool Board::send_telemetry() {
+  protocol::Telemetry telemetry = {};
+  telemetry.frame = now_.frame;
+  telemetry.phase_us = now_.phase_us;
+  for (uint8_t i = 0; i < protocol::kServos; ++i) {
+    telemetry.pulse_ticks[i] = current_.ticks[i];
+  }
+  telemetry.attached = current_attached_;
+  telemetry.queued = player_.queued();
+  telemetry.guard = static_cast<uint8_t>(detector_.guard());
+  telemetry.reflex_running = mode_ == Mode::kReflex;
+  telemetry.sensor = static_cast<uint8_t>(sensor_);
+  telemetry.baseline_raw = detector_.baseline_raw();
+  telemetry.sample_count = samples_.size();
+  for (uint8_t i = 0; i < samples_.size(); ++i) {
+    telemetry.samples[i].pressure_raw = samples_[i].pressure_raw;
+    telemetry.samples[i].age_us = age_us(samples_[i].sampled, now_);
+  }
+  telemetry.rx_damaged = receiver_.damaged();
+  telemetry.stop_number = stop_number_;
+  telemetry.underruns = underruns_;
+  if (!transmitter_.send(header(), telemetry))
+    return false;
+  samples_.clear();
+  return true;
+}
+
+}  // namespace setae

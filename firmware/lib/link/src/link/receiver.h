@@ -1,0 +1,29 @@
+// Wire bytes in, messages from the host out: frames with a right CRC, a known type, and the one
+// length that the type has. The rest is counted as damaged.
+#pragma once
+
+#include <stdint.h>
+
+#include "protocol/frame.h"
+
+namespace setae {
+
+class Receiver {
+ public:
+  // True where this byte ended a message. It stays readable until the next push().
+  bool push(uint8_t wire);
+
+  const protocol::HostHeader& header() const { return header_; }
+  protocol::MessageType type() const { return static_cast<protocol::MessageType>(header_.type); }
+  const uint8_t* payload() const { return decoder_.data() + protocol::HostHeader::kSize; }
+
+  uint8_t damaged() const { return decoder_.damaged(); }
+  // The message came from another session.
+  void count_stray() { decoder_.count_damaged(); }
+
+ private:
+  protocol::FrameDecoder decoder_;
+  protocol::HostHeader header_ = {};
+};
+
+}  // namespace setae

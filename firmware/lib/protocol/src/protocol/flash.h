@@ -1,0 +1,43 @@
+// Constant tables stay in flash on an AVR, where plain `const` would copy them to RAM.
+#pragma once
+
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define SETAE_FLASH PROGMEM
+#else
+#define SETAE_FLASH
+#endif
+
+namespace setae {
+namespace protocol {
+
+inline uint8_t flash_read(const uint8_t* address) {
+#ifdef __AVR__
+  return pgm_read_byte(address);
+#else
+  return *address;
+#endif
+}
+
+inline uint32_t flash_read(const uint32_t* address) {
+#ifdef __AVR__
+  return pgm_read_dword(address);
+#else
+  return *address;
+#endif
+}
+
+template <typename T>
+void flash_copy(const T* address, T& out) {
+#ifdef __AVR__
+  memcpy_P(&out, address, sizeof(T));
+#else
+  memcpy(&out, address, sizeof(T));
+#endif
+}
+
+}  // namespace protocol
+}  // namespace setae
