@@ -78,7 +78,7 @@ def estimate(record: Trip, config: Config, *, time_us: int) -> Contact:
     time_us
         Time of the deciding sample on the session's clock.
     """
-    history_mm = servo.lengths_mm(np.asarray(record.pulse_ticks, dtype=float), config)
+    history_mm = servo.ServoModel(config).lengths_mm(record.pulse_ticks)
     # In frames, counted back from the frozen ones: those were put out in the
     # frame in which the sample was taken, or in the next.
     phase = record.sample_phase_us / SERVO_FRAME_US

@@ -266,7 +266,8 @@ class _Trial:
         """Step down and scan until something was touched; how far the arm went."""
         # The arm lowers only with the robot short: its tip then goes first.
         self._compress()
-        for self._level in range(1, self._settings.steps + 1):
+        for level in range(1, self._settings.steps + 1):
+            self._level = level
             if not self._lower():
                 break
             self._scan()
@@ -388,9 +389,14 @@ class Setup(Protocol):
     """What `run_trials` needs of a rig."""
 
     @property
-    def robot(self) -> Robot: ...
+    def robot(self) -> Robot:
+        """The robot, enabled."""
+        ...
+
     @property
-    def stage(self) -> Stage: ...
+    def stage(self) -> Stage:
+        """The arm that carries it, at its start."""
+        ...
 
 
 def run_trials(

@@ -1,0 +1,5 @@
+"""`python -m setae.cli`."""
+
+from setae.cli import main
+
+main()

@@ -1,0 +1,64 @@
+"""What all commands share: the application, where the robot is, how to print."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+from rich.console import Console
+
+import setae
+from setae.config import Config, load
+from setae.errors import InputError
+
+app = App(
+    name="setae",
+    help="Drive, probe and simulate a tendon-driven continuum robot with a bristle.",
+    version=setae.__version__,
+)
+
+console = Console(highlight=False)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Where:
+    """Which robot a command talks to.
+
+    Parameters
+    ----------
+    sim
+        Use the simulator.
+    port
+        Serial port of the board, such as /dev/ttyACM0. Without it the board is
+        found by its USB ids.
+    config
+        TOML file with what differs from the paper's robot.
+    seed
+        Seed of the simulator: the same seed gives the same run.
+    """
+
+    sim: Annotated[bool, Parameter(negative="")] = False
+    port: str | None = None
+    config: Path | None = None
+    seed: int = 0
+
+    @property
+    def url(self) -> str | None:
+        """For `setae.rig.connect` and `setae.rig.open`."""
+        if self.sim and self.port is not None:
+            raise InputError("--sim and --port exclude each other.", "Give one of them.")
+        if self.seed < 0:
+            raise InputError(f"--seed is {self.seed}.", "Give 0 or more.")
+        return "sim://" if self.sim else self.port
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the robot is the simulated one."""
+        return self.url == "sim://"
+
+    def load(self) -> Config:
+        """The configuration."""
+        return load(self.config)

@@ -1,0 +1,253 @@
+"""`setae explore`: the paper's exploration of a tube."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+from rich.table import Table
+
+from setae import rig
+from setae.cli.common import Where, app, console
+from setae.config import Config
+from setae.errors import InputError, SetaeError
+from setae.experiments.explore import (
+    PAPER_DESCENTS_MM,
+    Event,
+    ExploreResult,
+    OnEvent,
+    paper_obstacles,
+    run_trials,
+)
+from setae.scene import Obstacle, tube_scene
+from setae.stage import ManualStage
+
+Flag = Annotated[bool, Parameter(negative="")]
+
+
+@app.command
+def explore(
+    *,
+    obstacle: Annotated[list[str] | None, Parameter(negative="")] = None,
+    azimuth: float = 0.0,
+    trials: Literal["paper"] | None = None,
+    out: Path | None = None,
+    force: Flag = False,
+    report: bool = True,
+    accept_jump: Flag = False,
+    where: Where | None = None,
+) -> None:
+    """Explore a tube: step down, feel in eight directions, stop at an obstacle.
+
+    Without --obstacle it runs the paper's five trials. Each trial writes a log
+    into the folder --out, and all of them one report.
+
+    Parameters
+    ----------
+    obstacle
+        Height in mm between the compressed bristle's tip and the top of a cube
+        at the tube's wall, or "none" for an empty tube. Several times: several
+        trials.
+    azimuth
+        Direction of the cube, as angle α of frame D, in degrees.
+    trials
+        "paper": the five trials of the paper.
+    out
+        Folder for logs and report; the default is the next free runs/explore-N.
+    force
+        Use --out though it holds files; logs of the same names are replaced.
+    report
+        Write the report.
+    accept_jump
+        Enable the servos though nobody knows where they are: the first pulse
+        may move them at full speed.
+    where
+        Which robot.
+    """
+    where = where or Where()
+    config = where.load()
+    obstacles = _obstacles(config, obstacle, azimuth, trials)
+    simulated = where.simulated
+    folder = _folder(out, force=force)
+    progress = _Progress(len(obstacles))
+    logs: list[Path] = []
+
+    @contextmanager
+    def setup(number: int, what: Obstacle | None) -> Iterator[tuple[rig.Rig, OnEvent]]:
+        progress.trial(number, what)
+        log = folder / f"trial-{number}.mcap"
+        if force:
+            log.unlink(missing_ok=True)
+        stage = None
+        if not simulated:
+            stage = ManualStage(ask=console.print)
+            _ask_to_place(what)
+        with rig.open(
+            where.url, config=config, seed=where.seed, scene=tube_scene(config, what), stage=stage
+        ) as opened:
+            recorder = opened.record(log, metadata={"experiment": "explore", "trial": number})
+            logs.append(log)
+            opened.robot.enable(accept_jump=accept_jump)
+
+            def on_event(event: Event) -> None:
+                recorder.experiment(event.time_us, event.name, event.data)
+                progress.event(event)
+
+            yield opened, on_event
+
+    try:
+        results = run_trials(
+            setup, obstacles=obstacles, arm_timeout_s=None if simulated else _MANUAL_TIMEOUT_S
+        )
+    except KeyboardInterrupt as interrupt:
+        interrupt.__notes__ = [
+            "interrupted: robot and arm are stopped.",
+            *(f"The log {log} is closed and readable." for log in logs[-1:]),
+        ]
+        raise
+    _print_table(results, paper=list(obstacles) == list(paper_obstacles(config)))
+    console.print(f"Logs: {folder}", soft_wrap=True)
+    if report:
+        _report(logs, folder)
+
+
+# A person jogs the arm by hand between two steps.
+_MANUAL_TIMEOUT_S = 600.0
+
+
+def _report(logs: Sequence[Path], folder: Path) -> None:
+    from setae import report
+
+    path = report.write(logs, folder / "report.html")
+    console.print(f"Report: {path}", soft_wrap=True)
+
+
+def _obstacles(
+    config: Config, given: Sequence[str] | None, azimuth_deg: float, trials: str | None
+) -> list[Obstacle | None]:
+    if given and trials:
+        raise InputError("--obstacle and --trials exclude each other.", "Give one of them.")
+    if not given:
+        obstacles = paper_obstacles(config)
+        return [what and dataclasses.replace(what, azimuth_deg=azimuth_deg) for what in obstacles]
+    return [_obstacle(config, text, azimuth_deg) for text in given]
+
+
+def _obstacle(config: Config, text: str, azimuth_deg: float) -> Obstacle | None:
+    if text.lower() == "none":
+        return None
+    try:
+        below_tip_mm = float(text)
+    except ValueError:
+        raise InputError(
+            f"--obstacle {text!r} is neither a height in mm nor none.",
+            "Give for example --obstacle 55.",
+        ) from None
+    return Obstacle(
+        below_tip_mm=below_tip_mm, azimuth_deg=azimuth_deg, edge_mm=config.tube.cube_edge_mm
+    )
+
+
+def _folder(out: Path | None, *, force: bool) -> Path:
+    """The folder to write into, made if need be."""
+    try:
+        if out is None:
+            number = 1
+            while (folder := Path("runs") / f"explore-{number}").exists():
+                number += 1
+            folder.mkdir(parents=True)
+            return folder
+        if out.is_dir() and any(out.iterdir()) and not force:
+            raise InputError(
+                f"{out} holds files already.", "Give another --out, or --force to write into it."
+            )
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SetaeError(
+            f"The folder {error.filename} can't be made: {error.strerror}.", "Give another --out."
+        ) from error
+    return out
+
+
+def _ask_to_place(what: Obstacle | None) -> None:
+    where = (
+        "Take every obstacle out of the tube"
+        if what is None
+        else f"Fix the cube {what.below_tip_mm:g} mm below the compressed tip"
+        f" at α = {what.azimuth_deg:g}°"
+    )
+    console.input(f"{where} and bring the arm to its start, then press Enter. ")
+
+
+class _Progress:
+    """Says in the terminal what happens."""
+
+    def __init__(self, trials: int) -> None:
+        self._trials = trials
+
+    def trial(self, number: int, what: Obstacle | None) -> None:
+        console.print(f"Trial {number} of {self._trials}: {_name(what)}")
+
+    def event(self, event: Event) -> None:
+        data = event.data
+        if event.name == "level_start":
+            console.print(f"  {data['descent_mm']:5.0f} mm down ", end="")
+        elif event.name == "direction_end":
+            if data["touched"]:
+                change_hpa = data["contact"]["pressure_hpa"] - data["contact"]["baseline_hpa"]
+                console.print(
+                    f"[bold red]{data['alpha_deg']:g}° ({change_hpa:+.0f} hPa)[/]", end=" "
+                )
+            else:
+                console.print(f"[dim]{data['alpha_deg']:g}°[/]", end=" ")
+        elif event.name == "level_end":
+            console.print("contact" if data["touched_deg"] else "free")
+        elif event.name == "lowering_contact":
+            console.print(
+                f"  [bold red]contact while the arm lowered[/], {data['contact']['descent_mm']:.1f}"
+                " mm down: arm stopped"
+            )
+        elif event.name == "trial_end":
+            console.print(
+                f"  descent {data['descent_mm']:g} mm, {len(data['contacts'])} contacts,"
+                f" {data['duration_s']:.0f} s"
+            )
+        elif event.name == "trial_aborted":
+            console.print("")
+
+
+def _name(what: Obstacle | None) -> str:
+    if what is None:
+        return "no obstacle"
+    where = "" if what.azimuth_deg == 0 else f" at α = {what.azimuth_deg:g}°"
+    return f"obstacle {what.below_tip_mm:g} mm below the tip{where}"
+
+
+def _print_table(results: Sequence[ExploreResult], *, paper: bool) -> None:
+    table = Table()
+    table.add_column("obstacle")
+    table.add_column("descent", justify="right")
+    if paper:
+        table.add_column("paper's descent", justify="right")
+    table.add_column("contacts", justify="right")
+    table.add_column("directions of contact")
+    for result, theirs_mm in zip(
+        results, PAPER_DESCENTS_MM if paper else [0.0] * len(results), strict=True
+    ):
+        angles = ", ".join(
+            "lowering" if touch.alpha_deg is None else f"{touch.alpha_deg:g}°"
+            for touch in result.contacts
+        )
+        row = [
+            "none" if result.obstacle is None else f"{result.obstacle.below_tip_mm:g} mm",
+            f"{result.descent_mm:g} mm",
+            *([f"{theirs_mm:g} mm"] if paper else []),
+            str(len(result.contacts)),
+            angles or "–",
+        ]
+        table.add_row(*row)
+    console.print(table)

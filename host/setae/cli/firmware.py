@@ -1,0 +1,87 @@
+"""`setae flash`: put the firmware of this version on the board."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+from setae import rig
+from setae.cli.common import app, console
+from setae.errors import SetaeError
+
+# Where PlatformIO leaves what it has built, below the folder of platformio.ini.
+_HEX = Path(".pio") / "build" / "uno" / "firmware.hex"
+# The UNO's bootloader: avrdude's names for programmer and part, and its rate.
+_AVRDUDE = ("-q", "-p", "atmega328p", "-c", "arduino", "-b", "115200", "-D")
+_TIMEOUT_S = 600
+
+
+@app.command
+def flash(*, port: str | None = None, hex_file: Path | None = None) -> None:
+    """Write the firmware to an Arduino UNO, then say which version answers.
+
+    PlatformIO builds and uploads it, where it is installed and the sources are
+    here. Otherwise avrdude uploads a hex file that was built before.
+
+    Parameters
+    ----------
+    port
+        Serial port; without it the board is found by its USB ids.
+    hex_file
+        A built firmware to upload with avrdude, instead of building one.
+    """
+    port = port or rig.find_port()
+    command, folder = _command(port, hex_file)
+    console.print(f"Running: {' '.join(command)}", soft_wrap=True)
+    try:
+        done = subprocess.run(command, cwd=folder, timeout=_TIMEOUT_S, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise SetaeError(
+            f"{command[0]} didn't end within {_TIMEOUT_S} s.", "Check cable and port, try again."
+        ) from error
+    if done.returncode != 0:
+        raise SetaeError(
+            f"{command[0]} failed with exit code {done.returncode}.",
+            "Its own output above says why. Correct that, then run it again.",
+        )
+    with rig.connect(port) as robot:
+        console.print(f"The board answers: firmware {robot.firmware_version}.")
+
+
+def _command(port: str, hex_file: Path | None) -> tuple[list[str], Path | None]:
+    """What to run, and where."""
+    project = _project()
+    pio = shutil.which("pio") or shutil.which("platformio")
+    if hex_file is None and pio is not None and project is not None:
+        return [pio, "run", "-e", "uno", "-t", "upload", "--upload-port", port], project
+    if hex_file is None and project is not None:
+        hex_file = project / _HEX
+    avrdude = shutil.which("avrdude")
+    if hex_file is not None and hex_file.is_file() and avrdude is not None:
+        return [avrdude, *_AVRDUDE, "-P", port, "-U", f"flash:w:{hex_file}:i"], None
+    if hex_file is not None and hex_file.is_file():
+        raise SetaeError(
+            "avrdude is missing, which writes a hex file to the board.",
+            "Install it (Debian: apt install avrdude), or PlatformIO (pip install platformio).",
+        )
+    if hex_file is not None and pio is not None:
+        raise SetaeError(f"There is no hex file {hex_file}.", "Give --hex-file an existing one.")
+    if project is None:
+        raise SetaeError(
+            "The firmware's sources aren't here: no platformio.ini in this folder or above.",
+            "Run it in the project's folder, or give --hex-file.",
+        )
+    raise SetaeError(
+        "PlatformIO is missing, and no hex file was built before.",
+        "Install it: pip install platformio.",
+    )
+
+
+def _project() -> Path | None:
+    """The nearest folder, from here upwards, with this firmware's platformio.ini."""
+    here = Path.cwd()
+    for folder in (here, *here.parents):
+        if (folder / "platformio.ini").is_file() and (folder / "firmware").is_dir():
+            return folder
+    return None

@@ -1,0 +1,281 @@
+"""Commands for one robot: look at it, move it, stop it."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+from rich.table import Table
+
+import setae
+from setae import rig
+from setae.cli.common import Where, app, console
+from setae.errors import SetaeError
+from setae.robot import Robot
+from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, ResetCause, Sensor
+
+Flag = Annotated[bool, Parameter(negative="")]
+# Negative coordinates are numbers, not options.
+Number = Annotated[float, Parameter(allow_leading_hyphen=True)]
+
+
+@app.command
+def ports() -> None:
+    """List the serial ports, and which of them look like the board."""
+    found = rig.ports()
+    if not found:
+        console.print("No serial ports. Plug the board in; look at its cable.")
+        return
+    table = Table("port", "what", "board?")
+    for port in found:
+        table.add_row(port.device, port.description, "yes" if port.likely else "")
+    console.print(table)
+
+
+@app.command
+def info(*, where: Where | None = None) -> None:
+    """Say which firmware answers, in which state, with which limits.
+
+    Parameters
+    ----------
+    where
+        Which robot.
+    """
+    with _connect(where, leave="hold") as robot:
+        reply = robot.hello
+        rows = {
+            "port": robot.session.transport.name,
+            "firmware": robot.firmware_version,
+            "protocol": f"{reply.protocol_version} (schema {reply.schema_hash:08x})",
+            "state": robot.state.name.lower(),
+            "last start": ResetCause(reply.reset_cause).doc,
+            "pose": "known" if robot.pose_known else "unknown: the first enable may jump",
+            "sensor": Sensor(reply.sensor).doc,
+            "limits": f"as configured (crc {reply.limits_crc:08x} at connect)",
+        }
+    for name, value in rows.items():
+        console.print(f"{name:<11} {value}", soft_wrap=True)
+
+
+@app.command
+def move(
+    x: Number,
+    y: Number,
+    z: Number,
+    /,
+    *,
+    duration: float | None = None,
+    speed: float | None = None,
+    relax: Flag = False,
+    accept_jump: Flag = False,
+    where: Where | None = None,
+) -> None:
+    """Move the spring's top to X Y Z (mm, frame D), then hold there.
+
+    Parameters
+    ----------
+    x, y, z
+        Target in mm.
+    duration
+        Time for the move in s.
+    speed
+        Speed of the fastest tendon in mm/s, instead of a duration.
+    relax
+        Relax afterwards instead of holding.
+    accept_jump
+        Enable the servos though nobody knows where they are.
+    where
+        Which robot.
+    """
+    with _connect(where, leave="relax" if relax else "hold") as robot:
+        robot.enable(accept_jump=accept_jump)
+        robot.move_to((x, y, z), duration_s=duration, speed_mm_s=speed)
+        console.print(f"At {_mm(robot.position_mm)}, tendons {_mm(robot.lengths_mm)}.")
+
+
+@app.command
+def probe(
+    x: Number,
+    y: Number,
+    z: Number,
+    /,
+    *,
+    speed: float | None = None,
+    relax: Flag = False,
+    accept_jump: Flag = False,
+    where: Where | None = None,
+) -> None:
+    """Move towards X Y Z (mm, frame D) until the bristle touches something.
+
+    On a contact the robot retracts to where it was.
+
+    Parameters
+    ----------
+    x, y, z
+        Target in mm.
+    speed
+        Speed of the spring's top in mm/s.
+    relax
+        Relax afterwards instead of holding.
+    accept_jump
+        Enable the servos though nobody knows where they are.
+    where
+        Which robot.
+    """
+    with _connect(where, leave="relax" if relax else "hold") as robot:
+        robot.enable(accept_jump=accept_jump)
+        contact = robot.probe((x, y, z), speed_mm_s=speed)
+        if contact is None:
+            console.print(f"No contact up to {_mm(robot.position_mm)}.")
+            return
+        console.print(
+            f"Contact: {contact.pressure_change_hpa:+.1f} hPa, spring's top at about"
+            f" {_mm(contact.position_mm)}, tip at about {_mm(contact.tip_mm)}"
+            f" (± {contact.uncertainty_mm:.1f} mm).",
+            soft_wrap=True,
+        )
+
+
+@app.command
+def stop(*, where: Where | None = None) -> None:
+    """Stop the robot: freeze its servos where they are.
+
+    Opening a UNO's port resets the board, which stops it too; this makes sure.
+
+    Parameters
+    ----------
+    where
+        Which robot.
+    """
+    with _connect(where, leave="hold") as robot:
+        robot.stop()
+        console.print(f"Stopped: the board is {robot.state.name.lower()}.")
+
+
+@app.command
+def relax(*, accept_jump: Flag = False, where: Where | None = None) -> None:
+    """Unwind the tendons slowly to the free length, then switch the servos off.
+
+    Parameters
+    ----------
+    accept_jump
+        Enable the servos though nobody knows where they are.
+    where
+        Which robot.
+    """
+    with _connect(where, leave="hold") as robot:
+        robot.resume()
+        # A board that was reset holds the tendons by the servos' gears alone, so
+        # they have to be switched on before they can unwind slowly.
+        robot.enable(accept_jump=accept_jump)
+        robot.relax()
+        console.print("Relaxed: the servos are off.")
+
+
+@app.command
+def doctor(*, where: Where | None = None) -> int:
+    """Check what can be checked, and say what to do about the rest.
+
+    Parameters
+    ----------
+    where
+        Which robot.
+
+    Returns
+    -------
+    int
+        Exit code: 1 if anything is wrong.
+    """
+    where = where or Where()
+    checks = _Checks()
+    checks.run("setae", lambda: f"{setae.__version__} on Python {platform.python_version()}")
+    checks.run("protocol", lambda: f"{PROTOCOL_VERSION} (schema {SCHEMA_HASH:08x})")
+    checks.run("configuration", lambda: _describe(where))
+    checks.run("simulator", rig.simulator_version)
+    checks.run("board", lambda: _check_board(where, checks))
+    return 1 if checks.failed else 0
+
+
+class _Checks:
+    """Runs checks one after the other and prints each outcome."""
+
+    def __init__(self) -> None:
+        self.failed = False
+
+    def run(self, name: str, check: Callable[[], str]) -> None:
+        try:
+            self.good(name, check())
+        except SetaeError as error:
+            self.bad(name, str(error))
+
+    def good(self, name: str, text: str) -> None:
+        console.print(f"[green]ok [/] {name:<14} {text}", soft_wrap=True)
+
+    def bad(self, name: str, text: str) -> None:
+        self.failed = True
+        console.print(f"[red]bad[/] {name:<14} {text}", soft_wrap=True)
+
+
+def _describe(where: Where) -> str:
+    config = where.load()
+    name = "the paper's robot" if where.config is None else str(where.config)
+    return f"{name}, tendon model {config.motion.model}"
+
+
+def _check_board(where: Where, checks: _Checks) -> str:
+    with _connect(where, leave="hold") as robot:
+        _check_reset(robot, checks)
+        _check_pressure(robot, checks)
+        return f"firmware {robot.firmware_version} on {robot.session.transport.name}, limits as configured"
+
+
+def _check_reset(robot: Robot, checks: _Checks) -> None:
+    cause = ResetCause(robot.hello.reset_cause)
+    if cause is ResetCause.BROWN_OUT:
+        checks.bad("supply", f"{cause.doc} Give the servos a supply of their own, common ground.")
+    elif cause is ResetCause.WATCHDOG:
+        checks.bad("last start", f"{cause.doc} Please report it, with what the robot did.")
+    else:
+        checks.good("last start", cause.doc)
+
+
+# Of the pressure at rest, peak to peak; the threshold of a contact is 15 hPa.
+_PRESSURE_NOISE_MAX_HPA = 3.0
+_PRESSURE_S = 1.0
+
+
+def _check_pressure(robot: Robot, checks: _Checks) -> None:
+    samples: list[float] = []
+    end_us = robot.now_us + round(_PRESSURE_S * 1e6)
+
+    def done() -> bool:
+        if robot.pressure_hpa is not None:
+            samples.append(robot.pressure_hpa)
+        return robot.now_us >= end_us
+
+    robot.wait(done, timeout_s=_PRESSURE_S + 1, what="pressure samples")
+    sensor = Sensor(robot.telemetry.sensor)
+    if sensor is not Sensor.OK or not samples:
+        checks.bad(
+            "sensor",
+            f"{sensor.doc} Check its four wires, its 3.3 V supply and its address (0x5D or 0x5C).",
+        )
+        return
+    spread_hpa = float(np.ptp(samples))
+    text = f"{np.mean(samples):.1f} hPa, {spread_hpa:.2f} hPa peak to peak at rest"
+    if spread_hpa > _PRESSURE_NOISE_MAX_HPA:
+        checks.bad("sensor", f"{text}: too noisy. Keep the bristle still; check its silicone bond.")
+    else:
+        checks.good("sensor", text)
+
+
+def _connect(where: Where | None, *, leave: rig.Leave) -> Robot:
+    where = where or Where()
+    return rig.connect(where.url, config=where.load(), seed=where.seed, leave=leave)
+
+
+def _mm(values: object) -> str:
+    return "(" + ", ".join(f"{value:.1f}" for value in np.asarray(values, dtype=float)) + ") mm"

@@ -1,0 +1,463 @@
+"""Puts a robot together: board or simulator, arm, log.
+
+`connect` gives a `setae.robot.Robot`. `open` gives a `Rig`: robot and arm, and
+what is simulated of them shares one world with one clock. Nothing else in the
+package knows whether anything is simulated.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self, TypeAlias
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+from serial.tools import list_ports
+
+import setae
+from setae.config import Config, load
+from setae.errors import InputError, LogError, PortNotFoundError, StageError
+from setae.link.events import Event, FaultReported, Refused, TelemetryReceived, Tripped
+from setae.link.serial_transport import SerialTransport
+from setae.link.session import Session
+from setae.link.transport import Transport
+from setae.record import Recorder
+from setae.robot import Robot
+from setae.scene import Scene, tube_scene
+from setae.sim.stage import SimulatedStage
+from setae.sim.transport import SimTransport
+from setae.sim.world import World
+from setae.stage import ManualStage, Stage
+from setae_protocol.messages import (
+    PRESSURE_LSB_PER_HPA,
+    PROTOCOL_VERSION,
+    PULSE_TICKS_PER_US,
+    Guard,
+    MessageType,
+    TripCause,
+)
+
+__all__ = ["Leave", "PortInfo", "Rig", "connect", "find_port", "open", "ports"]
+
+Leave: TypeAlias = Literal["relax", "hold"]
+
+# USB vendor and product of a UNO, its clones (CH340) and FTDI's adapters.
+_USB_IDS = {
+    (0x2341, 0x0043), (0x2341, 0x0001), (0x2341, 0x0243), (0x2A03, 0x0043),
+    (0x1A86, 0x7523), (0x0403, 0x6001),
+}  # fmt: skip
+
+_STAGE_PERIOD_US = 40_000
+_TRUTH_FRAMES = 2
+
+
+# ---------------------------------------------------------------------------- ports
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PortInfo:
+    """A serial port of this computer.
+
+    Attributes
+    ----------
+    device
+        Its name, such as /dev/ttyACM0.
+    description
+        What the system says of it.
+    likely
+        Whether its USB ids are those of a UNO or of a usual clone.
+    """
+
+    device: str
+    description: str
+    likely: bool
+
+
+def ports() -> list[PortInfo]:
+    """List the serial ports, by name."""
+    return sorted(
+        (
+            PortInfo(
+                device=port.device,
+                description=port.description or "",
+                likely=(port.vid, port.pid) in _USB_IDS,
+            )
+            for port in list_ports.comports()
+        ),
+        key=lambda port: port.device,
+    )
+
+
+def find_port() -> str:
+    """Find the one port with a board.
+
+    Raises
+    ------
+    PortNotFoundError
+        There is none, or more than one; the message lists the ports.
+    """
+    there = ports()
+    likely = [port.device for port in there if port.likely]
+    if len(likely) == 1:
+        return likely[0]
+    if likely:
+        raise PortNotFoundError(
+            f"{len(likely)} ports may hold the board: {', '.join(likely)}.",
+            "Choose one with --port, or connect(port).",
+        )
+    others = ", ".join(port.device for port in there) or "none at all"
+    raise PortNotFoundError(
+        f"No port has the USB ids of a UNO; ports here: {others}.",
+        "Plug the board in, name its port with --port, or use the simulator: --sim.",
+    )
+
+
+# ------------------------------------------------------------------------ connecting
+
+
+def connect(
+    url: str | None = None,
+    *,
+    config: Config | None = None,
+    seed: int = 0,
+    leave: Leave = "relax",
+) -> Robot:
+    """Connect to a robot and give its board the configuration's limits.
+
+    Parameters
+    ----------
+    url
+        ``sim://`` for the simulator, a serial port such as ``/dev/ttyACM0``, or
+        None to find the board by its USB ids.
+    config
+        The robot; None: the paper's.
+    seed
+        Seed of the simulator.
+    leave
+        What the end of a ``with`` block does to a robot that holds.
+
+    Returns
+    -------
+    Robot
+        Use it as a context manager.
+
+    Raises
+    ------
+    PortNotFoundError, PortBusyError, BoardSilentError, ProtocolMismatchError
+        Why there is no connection, and what to do.
+
+    Examples
+    --------
+    >>> with connect("sim://") as robot:
+    ...     robot.enable()
+    ...     robot.move_to((0, 0, 60))
+    ...     robot.position_mm.round().tolist()
+    [0.0, 0.0, 60.0]
+    """
+    return open(url, config=config, seed=seed, leave=leave, stage=None).robot
+
+
+def open(  # noqa: A001  # rig.open() is what it does
+    url: str | None = None,
+    *,
+    config: Config | None = None,
+    seed: int = 0,
+    scene: Scene | None = None,
+    stage: Stage | None = None,
+    leave: Leave = "relax",
+) -> Rig:
+    """Connect to a robot with its arm.
+
+    Parameters
+    ----------
+    url, config, seed, leave
+        As in `connect`.
+    scene
+        What the simulated robot hangs in; None: the empty tube. A real robot
+        hangs in what is there; the scene then only goes into the log.
+    stage
+        The arm. None: the simulated one, or for a real robot a person
+        (`setae.stage.ManualStage`).
+
+    Returns
+    -------
+    Rig
+        Use it as a context manager.
+    """
+    config = config or load()
+    scene = scene or tube_scene(config)
+    scheme = urlsplit(url).scheme if url and "://" in url else ""
+    if scheme == "sim":
+        assert url is not None
+        seed = _seed(url, seed)
+        world = _world(config, scene, seed)
+        transport: Transport = SimTransport(world)
+        stage = stage or SimulatedStage(world, config.stage)
+        session_id: int | None = seed % 255 + 1
+    else:
+        world = None
+        transport = SerialTransport(url or find_port())
+        stage = stage or ManualStage()
+        session_id = None
+    session = Session(transport, session_id=session_id, pollables=[stage])
+    try:
+        session.open()
+        robot = Robot(session, config, leave=leave)
+        robot.prepare()
+    except BaseException:
+        session.close()
+        raise
+    return Rig(robot, stage, scene, seed if world is not None else None, world)
+
+
+def _seed(url: str, seed: int) -> int:
+    """The seed: the URL's own, such as sim://?seed=3, or the given one."""
+    text = parse_qs(urlsplit(url).query).get("seed", [str(seed)])[-1]
+    try:
+        number = int(text)
+    except ValueError:
+        number = -1
+    if number < 0:
+        raise InputError(f"The simulator's seed is {text!r}.", "Give 0 or a whole number above.")
+    return number
+
+
+def _world(config: Config, scene: Scene, seed: int) -> World:
+    world = World(seed=seed, parameters=dict(config.simulator))
+    world.add_tube(scene.tube_axis_mm, scene.tube_inner_radius_mm)
+    if scene.box is not None:
+        world.add_box(scene.box.centre_mm, scene.box.edges_mm, scene.box.yaw_rad)
+    world.start((0.0, 0.0, 0.0))
+    return world
+
+
+def simulator_version() -> str:
+    """Say that the compiled simulator is there, by stepping one world.
+
+    Raises
+    ------
+    SimulatorMissingError
+        It isn't part of this installation.
+    """
+    config = load()
+    world = _world(config, tube_scene(config), seed=0)
+    world.run(1_000)
+    return "compiled in, runs"
+
+
+# ------------------------------------------------------------------------------- rig
+
+
+class Rig:
+    """A robot, the arm that carries it, and where both are logged.
+
+    Attributes
+    ----------
+    robot : Robot
+    stage : Stage
+    scene : Scene
+    seed : int or None
+        Of the simulator; None for a real robot.
+    world : World or None
+        The simulated world, to look at its truth; None for a real robot.
+    """
+
+    def __init__(
+        self, robot: Robot, stage: Stage, scene: Scene, seed: int | None, world: World | None
+    ) -> None:
+        self.robot = robot
+        self.stage = stage
+        self.scene = scene
+        self.seed = seed
+        self.world = world
+        self._log: _Log | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            if error is not None:
+                self._stop_stage(error)
+            self.robot.__exit__(kind, error, traceback)
+        finally:
+            # Last, so that the log holds how the robot was left.
+            if self._log is not None:
+                self._log.close()
+
+    def _stop_stage(self, error: BaseException) -> None:
+        try:
+            self.stage.stop()
+        except StageError as failure:
+            error.add_note(f"Stopping the arm failed too: {failure}")
+
+    def record(self, path: Path | str, *, metadata: Mapping[str, Any] | None = None) -> Recorder:
+        """Log everything from now on, until the rig is left.
+
+        Parameters
+        ----------
+        path
+            The log to make; it must not exist.
+        metadata
+            Added to what the rig says of itself: configuration, seed, versions,
+            scene.
+
+        Returns
+        -------
+        Recorder
+            For an experiment's own events.
+        """
+        if self._log is not None:
+            raise LogError(f"{self._log.recorder.path} is being written already.")
+        about = {**self._metadata(), **(metadata or {})}
+        self._log = _Log(self, Recorder(path, metadata=about))
+        return self._log.recorder
+
+    def _metadata(self) -> dict[str, Any]:
+        scene, box = self.scene, self.scene.box
+        return {
+            "simulated": self.world is not None,
+            "seed": self.seed,
+            "config": self.robot.config.to_toml(),
+            "versions": {
+                "setae": setae.__version__,
+                "firmware": self.robot.firmware_version,
+                "protocol": str(PROTOCOL_VERSION),
+                "numpy": importlib.metadata.version("numpy"),
+            },
+            "obstacle_below_tip_mm": scene.obstacle and scene.obstacle.below_tip_mm,
+            "scene": {
+                "tube": {
+                    "axis_mm": list(scene.tube_axis_mm[:2]),
+                    "inner_radius_mm": scene.tube_inner_radius_mm,
+                },
+                "cube": None
+                if box is None
+                else {
+                    "centre_mm": list(box.centre_mm),
+                    "edge_mm": box.edges_mm[0],
+                    "yaw_rad": box.yaw_rad,
+                },
+                "arm_start_mm": list(self.stage.position_mm),
+            },
+        }
+
+
+class _Log:
+    """Writes what the link, the arm and the simulator tell into a recorder."""
+
+    def __init__(self, rig: Rig, recorder: Recorder) -> None:
+        self.recorder = recorder
+        self._rig = rig
+        self._robot = rig.robot
+        self._stage_due_us = 0
+        self._stage_seen: tuple[object, bool] | None = None
+        self._frames = 0
+        self._robot.on_command = lambda name, args: recorder.command(self._robot.now_us, name, args)
+        self._unsubscribe = self._robot.session.subscribe(self._on_event)
+
+    def close(self) -> None:
+        self._unsubscribe()
+        self._robot.on_command = None
+        self.recorder.close()
+
+    def _on_event(self, event: Event) -> None:
+        if isinstance(event, TelemetryReceived):
+            self._telemetry(event)
+        elif isinstance(event, Tripped):
+            self._trip(event)
+        elif isinstance(event, FaultReported):
+            fault = event.record
+            self.recorder.fault(
+                event.time_us,
+                record_id=fault.record_id,
+                fault=fault.fault.name.lower(),
+                detail=fault.detail,
+                pulse_us=np.array(fault.pulse_ticks) / PULSE_TICKS_PER_US,
+            )
+        elif isinstance(event, Refused):
+            refusal = event.record
+            self.recorder.refusal(
+                event.time_us,
+                record_id=refusal.record_id,
+                command=MessageType(refusal.command_type).name.lower(),
+                reason=refusal.reason.name.lower(),
+                index=refusal.index,
+                value=refusal.value,
+                limit=refusal.limit,
+            )
+
+    def _telemetry(self, event: TelemetryReceived) -> None:
+        telemetry = event.telemetry
+        baseline_hpa = telemetry.baseline_raw / PRESSURE_LSB_PER_HPA
+        pulses_us = [
+            ticks / PULSE_TICKS_PER_US if telemetry.attached >> index & 1 else 0.0
+            for index, ticks in enumerate(telemetry.pulse_ticks)
+        ]
+        # By the board's own time: the line's delays don't belong into the log.
+        time_us = self._robot.host_time_us(telemetry.frame, telemetry.phase_us)
+        self.recorder.telemetry(
+            time_us,
+            frame=telemetry.frame,
+            state=event.state.name.lower(),
+            epoch=event.epoch,
+            pulse_us=pulses_us,
+            guard=telemetry.guard.name.lower(),
+            reflex_running=bool(telemetry.reflex_running),
+            queued=telemetry.queued,
+            baseline_hpa=baseline_hpa,
+        )
+        for sample in telemetry.samples[: telemetry.sample_count]:
+            self.recorder.pressure(
+                time_us - sample.age_us,
+                pressure_hpa=sample.pressure_raw / PRESSURE_LSB_PER_HPA,
+                baseline_hpa=baseline_hpa,
+                armed=telemetry.guard is Guard.ARMED,
+            )
+        self._stage(event.time_us)
+        self._frames += 1
+        if self._rig.world is not None and self._frames % _TRUTH_FRAMES == 0:
+            self._truth(self._rig.world)
+
+    def _trip(self, event: Tripped) -> None:
+        record = event.record
+        self.recorder.trip(
+            event.time_us,
+            record_id=record.record_id,
+            cause=record.cause.name.lower(),
+            sample_time_us=self._robot.host_time_us(record.sample_frame, record.sample_phase_us),
+            pressure_hpa=record.pressure_raw / PRESSURE_LSB_PER_HPA,
+            baseline_hpa=record.baseline_raw / PRESSURE_LSB_PER_HPA,
+            pulse_us=np.array(record.pulse_ticks) / PULSE_TICKS_PER_US,
+            contact=None if record.cause is TripCause.DEADLINE else self._robot.contact_of(event),
+        )
+
+    def _stage(self, time_us: int) -> None:
+        stage = self._rig.stage
+        seen = (stage.position_mm, stage.moving)
+        if seen != self._stage_seen and (time_us >= self._stage_due_us or not stage.moving):
+            self.recorder.stage(time_us, position_mm=stage.position_mm, moving=stage.moving)
+            self._stage_seen = seen
+            self._stage_due_us = time_us + _STAGE_PERIOD_US
+
+    def _truth(self, world: World) -> None:
+        truth = world.truth()
+        self.recorder.truth(
+            truth.time_us,
+            backbone_mm=truth.backbone_mm,
+            filament_mm=truth.filament_mm,
+            arm_mm=truth.arm_mm,
+            contact_depth_mm=truth.contact_depth_mm,
+            contact_point_mm=truth.contact_point_mm,
+            tension_n=truth.tension_n,
+            pressure_hpa=truth.pressure_hpa,
+        )

@@ -1,0 +1,817 @@
+"""The robot as a program uses it: moves, probes, stops.
+
+A `Robot` has no clock and no thread. Every call that takes time waits in the
+session's one loop, with a deadline, and raises what went wrong with what to do.
+The board keeps the robot safe on its own; nothing here is needed for that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from enum import IntEnum
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from setae import contact as contacts
+from setae import kinematics, servo, trajectory, workspace
+from setae.arc import Arc, finite_array
+from setae.config import Config
+from setae.contact import Contact
+from setae.errors import (
+    ConfigError,
+    DeadlineError,
+    FaultError,
+    InputError,
+    PoseUnknownError,
+    RefusedError,
+    StoppedError,
+    TrippedError,
+)
+from setae.link.events import (
+    Event,
+    FaultReported,
+    TelemetryReceived,
+    Ticket,
+    Tripped,
+)
+from setae.link.session import Session, refused_error
+from setae_protocol.messages import (
+    PRESSURE_LSB_PER_HPA,
+    SERVO_FRAME_US,
+    SERVOS,
+    Disarm,
+    Enable,
+    Guard,
+    GuardMessage,
+    HelloReply,
+    HostMessage,
+    Limits,
+    Limp,
+    Reflex,
+    Refusal,
+    RefusalMessage,
+    Relax,
+    Resume,
+    Segment,
+    SetLimits,
+    State,
+    Telemetry,
+    TripCause,
+)
+
+__all__ = ["Contact", "Robot"]
+
+_FRAME_S = SERVO_FRAME_US / 1e6
+# What an answer may take beyond the motion itself: the link's retries included.
+_REPLY_S = 2.0
+# After a motion the spring and the bristle swing on, and the servos lag.
+_SETTLE_S = 0.16
+# Attempts at a baseline; a bristle that swings gives a noisy one.
+_TARE_ATTEMPTS = 4
+_TARE_S = 0.5
+_RETRIED = (Refusal.TARE_NOISY, Refusal.TARE_FAR)
+_GUARD_FRAMES_MAX = 0xFFFF
+
+Ticks = tuple[int, int, int, int]
+OnCommand = Callable[[str, Mapping[str, Any]], None]
+
+
+class Robot:
+    """One robot, reached through an open session.
+
+    As a context manager it leaves the robot safe: after an exception it stops
+    (the servos hold, nothing is released); otherwise it relaxes slowly, or
+    holds where `leave` is ``"hold"``.
+
+    Parameters
+    ----------
+    session
+        Open session with the board.
+    config
+        The robot's description.
+    leave
+        What the end of the ``with`` block does to a robot that holds.
+    """
+
+    def __init__(
+        self, session: Session, config: Config, *, leave: Literal["relax", "hold"] = "relax"
+    ) -> None:
+        self.session = session
+        self.config = config
+        self.leave = leave
+        self.on_command: OnCommand | None = None
+        self._servos = servo.ServoModel(config)
+        self._pose_known = False
+        self._trip: Tripped | None = None
+        self._fault: FaultReported | None = None
+        self._telemetry: TelemetryReceived | None = None
+        self._pressure_hpa: float | None = None
+        self._tickets: list[Ticket] = []
+        session.subscribe(self._on_event)
+
+    # ------------------------------------------------------------------- life
+
+    def prepare(self) -> None:
+        """Give the board the configuration's limits, and check that it holds them.
+
+        Raises
+        ------
+        ConfigError
+            The board isn't relaxed and holds other limits.
+        """
+        self._wait(lambda: self._telemetry is not None, _REPLY_S, "the board's first telemetry")
+        wanted = servo.board_limits(self.config)
+        if self.state is State.RELAXED:
+            self._request(wanted)
+        held = self.session.read_limits()
+        if _values(held) == _values(wanted):
+            return
+        if self.state is State.RELAXED:
+            raise ConfigError(
+                "The board took the limits, but reads back others.",
+                "Flash the firmware of this version with `setae flash`.",
+            )
+        raise ConfigError(
+            f"The board is {_name(self.state)} under other limits than this configuration's.",
+            "Relax it with the configuration it was started with, or reset it.",
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None:
+                if self.leave == "relax" and self.state is State.HOLDING:
+                    self.relax()
+            elif self.state not in (State.RELAXED, State.STOPPED):
+                self.stop()
+        except Exception as failure:
+            if error is None:
+                raise
+            error.add_note(f"Stopping failed too: {failure}")
+        finally:
+            self.session.close()
+
+    # ------------------------------------------------------------------ facts
+
+    @property
+    def now_us(self) -> int:
+        """The session's clock."""
+        return self.session.now_us
+
+    @property
+    def state(self) -> State:
+        """What the board does."""
+        return self.session.state
+
+    @property
+    def hello(self) -> HelloReply:
+        """What the board said of itself when the session opened."""
+        assert self.session.hello is not None, "a Robot gets an open session"
+        return self.session.hello
+
+    @property
+    def firmware_version(self) -> str:
+        """Version of the board's firmware, such as 0.1.0."""
+        reply = self.hello
+        return f"{reply.firmware_major}.{reply.firmware_minor}.{reply.firmware_patch}"
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """The board's latest report."""
+        if self._telemetry is None:
+            raise DeadlineError("The board has not reported yet.", "Call prepare() first.")
+        return self._telemetry.telemetry
+
+    @property
+    def pose_known(self) -> bool:
+        """Whether the board knows where its servos are."""
+        return self._pose_known or bool(self.hello.pose_known)
+
+    @property
+    def lengths_mm(self) -> npt.NDArray[np.float64]:
+        """Commanded tendon lengths, (4,).
+
+        Raises
+        ------
+        PoseUnknownError
+            Nobody knows them before the first enable().
+        """
+        if not self.pose_known:
+            raise PoseUnknownError("Nobody knows where the servos are.")
+        return self._servos.lengths_mm(self.telemetry.pulse_ticks)
+
+    @property
+    def pose(self) -> Arc:
+        """The commanded pose: the arc that fits the commanded lengths best."""
+        return kinematics.forward(self.lengths_mm, self.config.geometry, model="parallel")
+
+    @property
+    def position_mm(self) -> npt.NDArray[np.float64]:
+        """Commanded place of the spring's top U in frame D, (3,)."""
+        return np.asarray(kinematics.position(self.pose), dtype=float)
+
+    @property
+    def pressure_hpa(self) -> float | None:
+        """The latest sample of the bristle's sensor; None before the first."""
+        return self._pressure_hpa
+
+    # ------------------------------------------------------------ on, off, stop
+
+    def enable(self, *, accept_jump: bool = False) -> None:
+        """Switch the servos on at the commanded pose, one after the other.
+
+        Parameters
+        ----------
+        accept_jump
+            Go on though nobody knows where the servos are: they jump to the
+            free length, which can release up to 50 mm of tendon at full speed.
+
+        Raises
+        ------
+        PoseUnknownError
+            The pose is unknown and `accept_jump` is False.
+        """
+        self._told("enable", accept_jump=accept_jump)
+        if self.state is State.HOLDING:
+            return
+        if self.state is not State.RELAXED:
+            self._require_holding()
+        if self.pose_known:
+            ticks = self._ticks_now()
+        elif accept_jump:
+            ticks = self._free_ticks()
+        else:
+            raise PoseUnknownError("Nobody knows where the servos are: the first pulse may jump.")
+        self._request(Enable(pulse_ticks=ticks))
+        self._wait(lambda: self._at_rest(ticks), _REPLY_S, "the servos to attach")
+        self._pose_known = True
+
+    def relax(self) -> None:
+        """Unwind slowly to the free length, then switch the servos off."""
+        self._told("relax")
+        if self.state is State.RELAXED:
+            return
+        speed_mm_s = self.config.motion.relax_speed_mm_s
+        slew = self._servos.speed_ticks(speed_mm_s)
+        free = self._free_ticks()
+        distance = max(abs(a - b) for a, b in zip(free, self._ticks_now(), strict=True))
+        self._request(Relax(slew_ticks=slew, free_ticks=free))
+        self._wait(
+            lambda: self.state is State.RELAXED,
+            distance / slew * _FRAME_S + _REPLY_S,
+            "the robot to relax",
+        )
+
+    def limp(self) -> None:
+        """Switch the servos off at once, in whatever state; their gears still hold.
+
+        A stopped, tripped or faulty board stays so until `resume`.
+        """
+        self._told("limp")
+        self._request(Limp(reserved=0), watch=False)
+        self._wait(
+            lambda: self.telemetry.attached == 0, _REPLY_S, "the servos to go off", watch=False
+        )
+
+    def stop(self) -> None:
+        """Freeze now, and wait until the board says so. Only `resume` ends it.
+
+        Raises
+        ------
+        LinkError
+            The board didn't confirm. It goes on with what it has queued, at most
+            a second, then holds.
+        """
+        self._told("stop")
+        self.session.stop()
+
+    def resume(self) -> None:
+        """Leave stopped, tripped or fault; a running reflex is waited for."""
+        self._told("resume")
+        if self.state in (State.RELAXED, State.HOLDING):
+            return
+        if self.state is State.TRIPPED:
+            self._wait(
+                lambda: not self.telemetry.reflex_running,
+                _REPLY_S + 60.0,
+                "the reflex to end",
+                watch=False,
+            )
+        self._trip = self._fault = None
+        self._request(Resume(epoch=self.session.epoch), watch=False)
+        self._wait(
+            lambda: self.state in (State.HOLDING, State.RELAXED),
+            _REPLY_S,
+            "the board to resume",
+            watch=False,
+        )
+        self._wait_for_telemetry()
+
+    # ------------------------------------------------------------------ motion
+
+    def move_to(
+        self,
+        position_mm: npt.ArrayLike,
+        *,
+        duration_s: float | None = None,
+        speed_mm_s: float | None = None,
+        model: str | None = None,
+    ) -> None:
+        """Move the spring's top to a position and wait until it is there.
+
+        Parameters
+        ----------
+        position_mm
+            Target in frame D, (3,).
+        duration_s
+            Time for the move; with neither this nor a speed, the configured
+            speed sets it.
+        speed_mm_s
+            Speed of the fastest tendon, at its fastest.
+        model
+            Tendon model; None takes the configured one.
+
+        Raises
+        ------
+        InputError, UnreachableError
+            The target means nothing, or the robot can't take it.
+        TrajectoryError
+            Too fast for the servos.
+        StoppedError, TrippedError, FaultError, RefusedError, LinkError
+            What ended the motion.
+        """
+        lengths_mm = self._lengths_for(position_mm, model)
+        self._told("move_to", position_mm=_list(position_mm), duration_s=duration_s,
+                   speed_mm_s=speed_mm_s, model=model)  # fmt: skip
+        self._move(lengths_mm, duration_s, speed_mm_s)
+
+    def move_lengths(
+        self,
+        lengths_mm: npt.ArrayLike,
+        *,
+        duration_s: float | None = None,
+        speed_mm_s: float | None = None,
+    ) -> None:
+        """Like `move_to`, for tendon lengths, (4,)."""
+        lengths = finite_array("lengths_mm", lengths_mm, last_axis=4, what="one a tendon")
+        if lengths.shape != (4,):
+            raise InputError(f"lengths_mm has shape {lengths.shape}.", "Give four lengths.")
+        self._told("move_lengths", lengths_mm=_list(lengths), duration_s=duration_s,
+                   speed_mm_s=speed_mm_s)  # fmt: skip
+        self._move(lengths, duration_s, speed_mm_s)
+
+    def compress(
+        self,
+        length_mm: float,
+        *,
+        duration_s: float | None = None,
+        speed_mm_s: float | None = None,
+    ) -> None:
+        """Straighten and shorten (or lengthen) the spring to a length; otherwise as `move_to`."""
+        self.move_to((0.0, 0.0, length_mm), duration_s=duration_s, speed_mm_s=speed_mm_s)
+
+    def probe(
+        self,
+        position_mm: npt.ArrayLike,
+        *,
+        speed_mm_s: float | None = None,
+        duration_s: float | None = None,
+        retract_mm: npt.ArrayLike | None = None,
+    ) -> Contact | None:
+        """Move towards a position until the bristle touches something.
+
+        The board takes the pressure's baseline at rest, then moves, and watches
+        by itself. On a contact it freezes, retracts, and this call returns where
+        the contact was; the robot then holds at the retract position. Without
+        one the robot holds at the target.
+
+        Parameters
+        ----------
+        position_mm
+            Target in frame D, (3,).
+        speed_mm_s
+            Mean speed of the spring's top; default: the configured probe speed.
+        duration_s
+            Time for the extension, instead of a speed.
+        retract_mm
+            Where the board retracts to after a contact, (3,); None: to where the
+            probe started.
+
+        Returns
+        -------
+        Contact or None
+            None where nothing was touched.
+
+        Raises
+        ------
+        RefusedError
+            The pressure was not steady enough for a baseline, or far from its
+            rest value: the bristle touches something already.
+        """
+        self._require_holding()
+        target = self._lengths_for(position_mm, None)
+        retract = (
+            self._ticks_now()
+            if retract_mm is None
+            else self._ticks_for(self._lengths_for(retract_mm, None))
+        )
+        if duration_s is None:
+            way_mm = float(np.linalg.norm(np.asarray(position_mm, dtype=float) - self.position_mm))
+            speed = speed_mm_s or self.config.motion.probe_speed_mm_s
+            duration_s = max(way_mm / _positive("speed_mm_s", speed), _FRAME_S)
+        elif speed_mm_s is not None:
+            raise InputError("Both duration_s and speed_mm_s are given.", "Give one of them.")
+        self._told("probe", position_mm=_list(position_mm), duration_s=duration_s,
+                   retract_mm=None if retract_mm is None else _list(retract_mm))  # fmt: skip
+        segments, duration_s = self._plan(target, duration_s, None)
+        final = segments[-1].target_ticks if segments else self._ticks_now()
+
+        def extend() -> bool:
+            self._queue(segments)
+            self._wait(
+                lambda: self._trip is not None or self._at_rest(final),
+                duration_s + _REPLY_S,
+                "the extension to end",
+                trips=True,
+            )
+            return self._trip is not None or self._pause(_SETTLE_S)
+
+        return self._guarded(
+            extend,
+            limit_s=duration_s + _SETTLE_S + 2 * _REPLY_S,
+            reflex=Reflex.RETRACT,
+            retract_ticks=retract,
+        )
+
+    def hold_guarded(
+        self,
+        begin: Callable[[], object],
+        busy: Callable[[], bool],
+        *,
+        timeout_s: float,
+    ) -> Contact | None:
+        """Hold still with the bristle watching, while something else moves.
+
+        Parameters
+        ----------
+        begin
+            Called once the bristle watches; starts the other motion.
+        busy
+            True while the other motion lasts.
+        timeout_s
+            For the other motion.
+
+        Returns
+        -------
+        Contact or None
+            A contact ends the wait at once; the robot holds. Ending the other
+            motion is the caller's.
+        """
+        self._require_holding()
+        self._told("hold_guarded", timeout_s=timeout_s)
+
+        def watch() -> bool:
+            begin()
+            self._wait(
+                lambda: self._trip is not None or not busy(),
+                timeout_s,
+                "the guarded motion to end",
+                trips=True,
+            )
+            return True
+
+        return self._guarded(
+            watch,
+            limit_s=timeout_s + 2 * _REPLY_S,
+            reflex=Reflex.HOLD,
+            retract_ticks=self._ticks_now(),
+        )
+
+    def wait(self, done: Callable[[], bool], *, timeout_s: float, what: str) -> None:
+        """Wait for something, with the robot watched meanwhile.
+
+        Parameters
+        ----------
+        done
+            Asked after everything that happens.
+        timeout_s
+            After this long, DeadlineError.
+        what
+            What is waited for, for the message.
+        """
+        self._wait(done, timeout_s, what)
+
+    # -------------------------------------------------------------- guarded moves
+
+    def _guarded(
+        self,
+        act: Callable[[], object],
+        *,
+        limit_s: float,
+        reflex: Reflex,
+        retract_ticks: Ticks,
+    ) -> Contact | None:
+        """Arm, act, disarm; what was touched meanwhile."""
+        self._pause(_SETTLE_S)
+        self._arm(limit_s, reflex, retract_ticks)
+        act()
+        if self._trip is None:
+            # A contact in the very last moment still wins over the disarming.
+            ticket = self._send(Disarm(reserved=0))
+            self._wait(
+                lambda: ticket.done or self._trip is not None,
+                _REPLY_S,
+                "the board to disarm",
+                trips=True,
+            )
+        if self._trip is None:
+            return None
+        return self._end_of_trip(self._trip, limit_s)
+
+    def _arm(self, limit_s: float, reflex: Reflex, retract_ticks: Ticks) -> None:
+        """Have the baseline taken. A bristle that still swings gets another chance."""
+        for attempt in range(1, _TARE_ATTEMPTS + 1):
+            refusal = self._try_to_arm(limit_s, reflex, retract_ticks)
+            if refusal is None:
+                return
+            if refusal.reason not in _RETRIED or attempt == _TARE_ATTEMPTS:
+                raise refused_error(refusal)
+            self._pause(_TARE_S)
+
+    def _try_to_arm(
+        self, limit_s: float, reflex: Reflex, retract_ticks: Ticks
+    ) -> RefusalMessage | None:
+        bristle = self.config.bristle
+        ticket = self._send(
+            GuardMessage(
+                epoch=self.session.epoch,
+                threshold_raw=round(bristle.threshold_hpa * PRESSURE_LSB_PER_HPA),
+                consecutive=bristle.consecutive,
+                deadline_frames=min(math.ceil(limit_s / _FRAME_S), _GUARD_FRAMES_MAX),
+                reflex=reflex,
+                retract_ticks=retract_ticks,
+                retract_slew_ticks=self._servos.speed_ticks(self.config.motion.retract_speed_mm_s),
+            ),
+            watch=False,
+        )
+        self._wait(
+            lambda: ticket.refusal is not None or self.telemetry.guard == Guard.ARMED,
+            _REPLY_S,
+            "the board to take the baseline",
+        )
+        return ticket.refusal
+
+    def _end_of_trip(self, trip: Tripped, limit_s: float) -> Contact:
+        """Wait for the reflex, then hold again."""
+        if trip.record.cause == TripCause.DEADLINE:
+            raise DeadlineError(
+                f"The guarded move took longer than its {limit_s:.1f} s, so the board froze it.",
+                "Call resume(), then try again with more time.",
+            )
+        found = self.contact_of(trip)
+        self._trip = None
+        self.resume()
+        return found
+
+    def contact_of(self, trip: Tripped) -> Contact:
+        """What a trip's record tells about the contact."""
+        return contacts.estimate(
+            trip.record,
+            self.config,
+            time_us=self.host_time_us(trip.record.sample_frame, trip.record.sample_phase_us),
+        )
+
+    def host_time_us(self, frame: int, phase_us: int) -> int:
+        """A board time on the session's clock."""
+        return round(self.session.clock.to_host_us(frame * SERVO_FRAME_US + phase_us))
+
+    # -------------------------------------------------------------------- motion
+
+    def _lengths_for(
+        self, position_mm: npt.ArrayLike, model: str | None
+    ) -> npt.NDArray[np.float64]:
+        position = finite_array("position_mm", position_mm, last_axis=3, what="x, y, z")
+        if position.shape != (3,):
+            raise InputError(f"position_mm has shape {position.shape}.", "Give one x, y, z.")
+        arc = kinematics.inverse(position)
+        return workspace.require(arc, self.config, model)
+
+    def _move(
+        self,
+        lengths_mm: npt.NDArray[np.float64],
+        duration_s: float | None,
+        speed_mm_s: float | None,
+    ) -> None:
+        self._require_holding()
+        segments, duration_s = self._plan(lengths_mm, duration_s, speed_mm_s)
+        if not segments:
+            return
+        self._queue(segments)
+        final = segments[-1].target_ticks
+        self._wait(lambda: self._at_rest(final), duration_s + _REPLY_S, "the move to end")
+
+    def _queue(self, segments: list[Segment]) -> None:
+        """Hand segments to the link, which sends them as the board has room."""
+        for message in servo.segment_messages(segments, epoch=self.session.epoch):
+            self._send(message)
+
+    def _pause(self, duration_s: float) -> bool:
+        """Let time pass; True. Ends early with a trip."""
+        end_us = self.now_us + round(duration_s * 1e6)
+        self._wait(
+            lambda: self._trip is not None or self.now_us >= end_us,
+            duration_s + _REPLY_S,
+            "time to pass",
+            trips=True,
+        )
+        return True
+
+    def _plan(
+        self,
+        lengths_mm: npt.NDArray[np.float64],
+        duration_s: float | None,
+        speed_mm_s: float | None,
+    ) -> tuple[list[Segment], float]:
+        """Segments from the present pulses to tendon lengths, and the time they take."""
+        raise NotImplementedError
+
+    # ------------------------------------------------------------------- waiting
+
+    def _wait(
+        self,
+        done: Callable[[], bool],
+        timeout_s: float,
+        what: str,
+        *,
+        trips: bool = False,
+        watch: bool = True,
+    ) -> None:
+        """Wait in the session's loop.
+
+        Parameters
+        ----------
+        trips
+            A trip is what `done` looks for; otherwise it is an error.
+        watch
+            Whether a stop, trip or fault ends the wait with its error.
+        """
+
+        def settled() -> bool:
+            if watch:
+                self._raise_problem(trips=trips)
+            return done()
+
+        try:
+            self.session.run_until(settled, round(timeout_s * 1e6))
+        except DeadlineError:
+            raise DeadlineError(
+                f"Waited {timeout_s:.1f} s for {what}; the board is {_name(self.state)}.",
+                "Look at the robot; `setae doctor` checks the board.",
+            ) from None
+
+    def _raise_problem(self, *, trips: bool) -> None:
+        for ticket in self._tickets:
+            if ticket.refusal is not None:
+                self._tickets.clear()
+                raise refused_error(ticket.refusal)
+        if self.state is State.STOPPED:
+            raise StoppedError("The robot is stopped.")
+        if self._fault is not None:
+            raise _fault(self._fault)
+        if self._trip is not None and not trips:
+            raise self._trip_error(self._trip)
+
+    def _require_holding(self) -> None:
+        """Raise what keeps the robot from moving."""
+        state = self.state
+        if state is State.HOLDING:
+            return
+        if state is State.RELAXED:
+            raise RefusedError(
+                "not_enabled", "Call enable() first.", command="the motion",
+                detail="The servos have no pulses.",
+            )  # fmt: skip
+        if state is State.STOPPED:
+            raise StoppedError("The robot is stopped.")
+        if state is State.TRIPPED:
+            raise (
+                TrippedError("The robot is tripped: the bristle touched something.")
+                if (self._trip is None)
+                else self._trip_error(self._trip)
+            )
+        if state is State.FAULT:
+            raise (
+                FaultError("unknown", "Call resume() once its cause is gone.")
+                if (self._fault is None)
+                else _fault(self._fault)
+            )
+        raise RefusedError("busy", "Wait for the motion to end.", command="the motion",
+                           detail="The board is moving.")  # fmt: skip
+
+    def _trip_error(self, trip: Tripped) -> TrippedError:
+        record = trip.record
+        change_hpa = (record.pressure_raw - record.baseline_raw) / PRESSURE_LSB_PER_HPA
+        if record.cause == TripCause.DEADLINE:
+            return TrippedError("The guarded move passed its deadline and was frozen.",
+                                "Call resume(), then try again with more time.")  # fmt: skip
+        return TrippedError(
+            f"The bristle touched something ({change_hpa:+.1f} hPa) and the robot froze."
+        )
+
+    def _on_event(self, event: Event) -> None:
+        if isinstance(event, TelemetryReceived):
+            self._telemetry = event
+            telemetry = event.telemetry
+            if telemetry.sample_count:
+                sample = telemetry.samples[telemetry.sample_count - 1]
+                self._pressure_hpa = sample.pressure_raw / PRESSURE_LSB_PER_HPA
+        elif isinstance(event, Tripped) and not event.earlier:
+            self._trip = event
+        elif isinstance(event, FaultReported) and not event.earlier:
+            self._fault = event
+
+    def _wait_for_telemetry(self) -> None:
+        """Wait for a report that was made after now."""
+        before = self._telemetry
+        self._wait(lambda: self._telemetry is not before, _REPLY_S, "telemetry", watch=False)
+
+    # ------------------------------------------------------------------- details
+
+    def _send(self, message: HostMessage, *, watch: bool = True) -> Ticket:
+        ticket = self.session.send(message)
+        # A refusal stays until it is told.
+        self._tickets = [
+            known for known in self._tickets if not known.done or known.refusal is not None
+        ]
+        if watch:
+            self._tickets.append(ticket)
+        return ticket
+
+    def _request(self, message: HostMessage, *, watch: bool = True) -> None:
+        """Send a command and wait until the board has carried it out."""
+        ticket = self._send(message, watch=False)
+        self._wait(lambda: ticket.done, _REPLY_S, f"the board to take `{_name(message.TYPE)}`",
+                   watch=watch)  # fmt: skip
+        if ticket.refusal is not None:
+            raise refused_error(ticket.refusal)
+
+    def _at_rest(self, ticks: Ticks) -> bool:
+        telemetry = self.telemetry
+        return (
+            self.state is State.HOLDING
+            and telemetry.queued == 0
+            and tuple(telemetry.pulse_ticks) == tuple(ticks)
+        )
+
+    def _told(self, name: str, **args: Any) -> None:
+        if self.on_command is not None:
+            self.on_command(name, args)
+
+    def _ticks_now(self) -> Ticks:
+        return self.telemetry.pulse_ticks
+
+    def _free_ticks(self) -> Ticks:
+        return _four(self._servos.free_ticks())
+
+    def _ticks_for(self, lengths_mm: npt.NDArray[np.float64]) -> Ticks:
+        return _four(self._servos.ticks(lengths_mm))
+
+
+def _four(ticks: npt.NDArray[np.int64]) -> Ticks:
+    a, b, c, d = (int(tick) for tick in ticks)
+    return a, b, c, d
+
+
+def _values(limits: Limits | SetLimits) -> bytes:
+    # Both messages have the same payload.
+    return limits.pack()
+
+
+def _name(code: IntEnum) -> str:
+    return code.name.lower()
+
+
+def _list(values: npt.ArrayLike) -> list[float]:
+    return [float(value) for value in np.asarray(values, dtype=float).ravel()]
+
+
+def _positive(name: str, value: float) -> float:
+    if not (math.isfinite(value) and value > 0):
+        raise InputError(f"{name} is {value}.", "Give a number above 0.")
+    return value
+
+
+def _fault(report: FaultReported) -> FaultError:
+    fault = report.record.fault
+    return FaultError(_name(fault), fault.remedy, detail=fault.doc)
