@@ -69,8 +69,8 @@ const Entry kEntries[] = {
     SETAE_ONE(bristle, contact_saturation_hpa, 80, 1, 240),
     SETAE_ONE(bristle, relaxation_fraction, 0.15, 0, 0.95),
     SETAE_ONE(bristle, relaxation_time_s, 0.5, 0.01, 100),
-    SETAE_ONE(bristle, motion_axial_hpa_s2_per_mm, 0.01, 0, 1),
-    SETAE_ONE(bristle, motion_lateral_hpa_s2_per_mm, 0.005, 0, 1),
+    SETAE_ONE(bristle, motion_axial_hpa_s2_per_mm, 0.007, 0, 1),
+    SETAE_ONE(bristle, motion_lateral_hpa_s2_per_mm, 0.004, 0, 1),
     SETAE_ONE(bristle, natural_frequency_hz, 12, 1, 200),
     SETAE_ONE(bristle, damping_ratio, 0.5, 0.05, 5),
 

@@ -1,0 +1,22 @@
+"""The simulated robot: the board's own code and a physical plant, in virtual time.
+
+Everything here drives one compiled library through a C interface,
+`simulator/setae_sim.h`. A `World` holds board, line, plant, sensor, arm and
+solids; `SimTransport` and `SimulatedStage` are the two ways into it that look
+like hardware to the rest of setae.
+"""
+
+from setae.sim.library import SimulationError
+from setae.sim.stage import SimulatedStage
+from setae.sim.transport import SimTransport
+from setae.sim.world import SensorFault, Truth, World, parameter_names
+
+__all__ = [
+    "SensorFault",
+    "SimTransport",
+    "SimulatedStage",
+    "SimulationError",
+    "Truth",
+    "World",
+    "parameter_names",
+]

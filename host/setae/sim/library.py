@@ -1,0 +1,130 @@
+"""The compiled simulator: where it is, and its C functions with their types."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib.util
+import os
+from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint64
+from pathlib import Path
+
+from setae.errors import SetaeError, SimulatorMissingError
+
+__all__ = ["BACKBONE_POINTS", "TENDONS", "CTruth", "SimulationError", "load"]
+
+BACKBONE_POINTS = 21
+TENDONS = 4
+
+#: A library to use instead of the installed one, for work on the simulator.
+LIBRARY_VARIABLE = "SETAE_SIM_LIBRARY"
+
+
+class SimulationError(SetaeError):
+    """The simulated world can't go on.
+
+    Examples of when it happens: the spring has no equilibrium with the given
+    parameters.
+    """
+
+    default_remedy = "Go back to the simulator's default parameters, or nearer to them."
+
+
+class CTruth(ctypes.Structure):
+    """`setae_truth` of setae_sim.h."""
+
+    _fields_ = (
+        ("time_us", c_int64),
+        ("arm_mm", c_double * 3),
+        ("arm_target_mm", c_double * 3),
+        ("arm_moving", c_int32),
+        ("board_attached", c_int32),
+        ("pulse_us", c_double * TENDONS),
+        ("servo_length_mm", c_double * TENDONS),
+        ("tension_n", c_double * TENDONS),
+        ("backbone_mm", c_double * 3 * BACKBONE_POINTS),
+        ("rotation", c_double * 9),
+        ("filament_mm", c_double * 3 * 2),
+        ("contact_depth_mm", c_double),
+        ("contact_point_mm", c_double * 3),
+        ("pressure_hpa", c_double),
+        ("plant_residual", c_double),
+    )
+
+
+def library_path() -> Path:
+    """Return where the compiled simulator is.
+
+    Raises
+    ------
+    SimulatorMissingError
+        It was not compiled when setae was installed.
+    """
+    if chosen := os.environ.get(LIBRARY_VARIABLE):
+        path = Path(chosen)
+        if not path.is_file():
+            raise SimulatorMissingError(
+                f"{LIBRARY_VARIABLE} names {path}, which is no file.",
+                "Build it with cmake, or unset the variable.",
+            )
+        return path
+    # Not Path(__file__): in an editable installation the library lies elsewhere.
+    spec = importlib.util.find_spec("setae.sim.setae_sim")
+    if spec is None or spec.origin is None:
+        raise SimulatorMissingError(
+            "The simulator was not compiled: there was no C++ compiler when setae was installed."
+        )
+    return Path(spec.origin)
+
+
+@functools.cache
+def load() -> ctypes.CDLL:
+    """Load the compiled simulator and declare its functions.
+
+    Raises
+    ------
+    SimulatorMissingError
+        It isn't there, or doesn't load.
+    """
+    path = library_path()
+    try:
+        library = ctypes.CDLL(os.fspath(path))
+    except OSError as error:
+        raise SimulatorMissingError(
+            f"The compiled simulator {path} does not load: {error}.",
+            "Install setae again on this machine.",
+        ) from error
+    world = ctypes.c_void_p
+    vector = POINTER(c_double)
+    status = c_int
+    signatures: dict[str, tuple[type | None, tuple[type, ...]]] = {
+        "create": (world, (c_uint64,)),
+        "destroy": (None, (world,)),
+        "error": (c_char_p, (world,)),
+        "parameter_count": (c_int, ()),
+        "parameter_name": (c_char_p, (c_int,)),
+        "set": (status, (world, c_char_p, c_double)),
+        "get": (status, (world, c_char_p, vector)),
+        "add_tube": (status, (world, vector, c_double)),
+        "add_box": (status, (world, vector, vector, c_double)),
+        "start": (status, (world, vector)),
+        "now_us": (c_int64, (world,)),
+        "send": (status, (world, c_char_p, c_size_t)),
+        "run": (status, (world, c_int64, c_char_p, POINTER(c_size_t))),
+        "arm_move": (status, (world, vector, c_double, c_double)),
+        "arm_stop": (status, (world, c_double)),
+        "truth": (status, (world, POINTER(CTruth))),
+        "sensor_fault": (status, (world, c_int)),
+        "reset_board": (status, (world,)),
+    }
+    for name, (result, arguments) in signatures.items():
+        try:
+            function = getattr(library, f"setae_world_{name}")
+        except AttributeError as error:
+            raise SimulatorMissingError(
+                f"The compiled simulator {path} is of another version: it has no {name}.",
+                "Install setae again.",
+            ) from error
+        function.restype = result
+        function.argtypes = arguments
+    return library

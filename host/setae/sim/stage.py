@@ -1,0 +1,87 @@
+"""The simulated arm as a stage."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from setae.config import Stage as Bounds
+from setae.errors import StageError
+from setae.sim.world import World
+
+__all__ = ["SimulatedStage"]
+
+
+class SimulatedStage:
+    """A `setae.stage.Stage` that moves the arm of a world.
+
+    Parameters
+    ----------
+    world
+        The world that the robot's board lives in too; it has been started.
+    bounds
+        Speed and acceleration of a move that names none, and of braking.
+    """
+
+    def __init__(self, world: World, bounds: Bounds) -> None:
+        self._world = world
+        self._bounds = bounds
+
+    @property
+    def position_mm(self) -> tuple[float, float, float]:
+        """Where the origin of frame D is now, in the world."""
+        x_mm, y_mm, z_mm = self._world.truth().arm_mm.tolist()
+        return (x_mm, y_mm, z_mm)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the arm moves."""
+        return self._world.truth().arm_moving
+
+    def move_to(
+        self,
+        position_mm: Sequence[float],
+        *,
+        speed_mm_s: float | None = None,
+        acceleration_mm_s2: float | None = None,
+    ) -> None:
+        """Start a straight move; returns at once.
+
+        Parameters
+        ----------
+        position_mm
+            Target of frame D's origin in the world, (3,).
+        speed_mm_s, acceleration_mm_s2
+            Bounds of the move; None takes the stage's own.
+
+        Raises
+        ------
+        StageError
+            The arm is moving, or a value is no good.
+        """
+        bounds = self._bounds
+        speed = bounds.speed_mm_s if speed_mm_s is None else speed_mm_s
+        acceleration = (
+            bounds.acceleration_mm_s2 if acceleration_mm_s2 is None else acceleration_mm_s2
+        )
+        target = np.asarray(position_mm, dtype=np.float64)
+        if target.shape != (3,) or not np.isfinite(target).all():
+            raise StageError(
+                f"The arm can't go to {position_mm}.", "Give three finite numbers, in mm."
+            )
+        for name, value in (("speed_mm_s", speed), ("acceleration_mm_s2", acceleration)):
+            if not (math.isfinite(value) and value > 0):
+                raise StageError(f"{name} is {value}.", "Give a positive number.")
+        if self.moving:
+            raise StageError("The arm is moving already.", "Wait for it, or stop it first.")
+        self._world.arm_move(target.tolist(), speed, acceleration)
+
+    def stop(self) -> None:
+        """Brake now; returns without waiting for rest."""
+        self._world.arm_stop(self._bounds.acceleration_mm_s2)
+
+    def poll(self, now_us: int) -> None:
+        """Do nothing: the world moves the arm, and it can't fail."""
+        del now_us

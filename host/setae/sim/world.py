@@ -1,0 +1,309 @@
+"""One simulated world: board, line, plant, sensor, arm and solids in one time."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from setae.errors import InputError
+from setae.sim.library import CTruth, SimulationError, load
+
+__all__ = ["SensorFault", "Truth", "World", "parameter_names"]
+
+_BAD_ARGUMENT = -1
+_READ_ROOM = 4096
+
+Array = NDArray[np.float64]
+
+
+class SensorFault(IntEnum):
+    """What can be wrong with the simulated pressure sensor."""
+
+    NONE = 0
+    ABSENT = 1
+    SILENT = 2
+    BUS = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """What the simulator knows and no host can measure.
+
+    Attributes
+    ----------
+    time_us
+        Virtual time since power-on.
+    arm_mm, arm_target_mm
+        Origin of frame D in the world and where it goes, (3,).
+    arm_moving
+        Whether the arm moves.
+    attached
+        Whether each servo has pulses.
+    pulse_us
+        What the board puts out, (4,); 0 where a servo has no pulses.
+    servo_length_mm
+        Free tendon length that each servo leaves, (4,).
+    tension_n
+        Tension of each tendon, (4,); 0 where it is slack.
+    backbone_mm
+        The spring's centre line in frame D, from D to U, (21, 3).
+    rotation
+        Frame U in frame D, (3, 3).
+    filament_mm
+        Root and tip E of the undeformed filament in frame D, (2, 3).
+    contact_depth_mm
+        Deepest penetration of the undeformed filament; 0 without contact.
+    contact_point_mm
+        Where that is in the world, (3,); None without contact.
+    pressure_hpa
+        Pressure at the sensor's last sample, noise included.
+    plant_residual
+        Scaled gradient norm of the equilibrium; below 1e-4 it is solved.
+    """
+
+    time_us: int
+    arm_mm: Array
+    arm_target_mm: Array
+    arm_moving: bool
+    attached: tuple[bool, bool, bool, bool]
+    pulse_us: Array
+    servo_length_mm: Array
+    tension_n: Array
+    backbone_mm: Array
+    rotation: Array
+    filament_mm: Array
+    contact_depth_mm: float
+    contact_point_mm: Array | None
+    pressure_hpa: float
+    plant_residual: float
+
+
+def parameter_names() -> tuple[str, ...]:
+    """Return the names of all parameters, such as ``spring.axial_rate_n_per_mm``."""
+    library = load()
+    count = library.setae_world_parameter_count()
+    return tuple(library.setae_world_parameter_name(i).decode() for i in range(count))
+
+
+def _vector(name: str, values: Sequence[float] | Array) -> ctypes.Array[ctypes.c_double]:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != (3,):
+        raise InputError(f"{name} has shape {array.shape}.", "Give three numbers, in mm.")
+    return (ctypes.c_double * 3)(*array)
+
+
+class World:
+    """A simulated world. Set it up, start it, then run it; nothing runs by itself.
+
+    Parameters
+    ----------
+    seed
+        Of all noise: same seed, same calls, same bytes.
+    parameters
+        Values by the simulator's own names (see `parameter_names`); the others
+        keep their defaults.
+
+    Raises
+    ------
+    SimulatorMissingError
+        The simulator was not compiled.
+    InputError
+        No parameter has that name, or its value is no good.
+
+    Examples
+    --------
+    >>> from setae.sim import World
+    >>> with World(seed=1) as world:
+    ...     world.start()
+    ...     _ = world.run(100_000)
+    ...     round(float(world.truth().backbone_mm[-1, 2]), 1)
+    70.0
+    """
+
+    def __init__(
+        self,
+        *,
+        seed: int = 0,
+        parameters: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+    ) -> None:
+        self._library = load()
+        self._handle: int | None = None
+        if not 0 <= seed < 2**64:
+            raise InputError(f"seed is {seed}.", "Give a whole number from 0 to 2**64 - 1.")
+        self._handle = self._library.setae_world_create(seed)
+        if not self._handle:
+            raise MemoryError
+        self._truth = CTruth()
+        self._room = ctypes.create_string_buffer(_READ_ROOM)
+        self._size = ctypes.c_size_t()
+        for name, value in dict(parameters).items():
+            self.set(name, value)
+
+    def set(self, name: str, value: float) -> None:
+        """Set a parameter, before the start.
+
+        Raises
+        ------
+        InputError
+            No parameter has that name, or the value is no good for it.
+        """
+        self._check(self._library.setae_world_set(self._live, name.encode(), value))
+
+    def get(self, name: str) -> float:
+        """Return a parameter's value. Raises InputError where there is none of that name."""
+        value = ctypes.c_double()
+        self._check(self._library.setae_world_get(self._live, name.encode(), ctypes.byref(value)))
+        return value.value
+
+    def add_tube(self, axis_point_mm: Sequence[float], inner_radius_mm: float) -> None:
+        """Add a vertical tube, before the start; its wall is all beyond the inner radius."""
+        point = _vector("axis_point_mm", axis_point_mm)
+        self._check(self._library.setae_world_add_tube(self._live, point, inner_radius_mm))
+
+    def add_box(
+        self, centre_mm: Sequence[float], edges_mm: Sequence[float], yaw_rad: float = 0.0
+    ) -> None:
+        """Add an upright box, turned by yaw about z, before the start."""
+        centre = _vector("centre_mm", centre_mm)
+        edges = _vector("edges_mm", edges_mm)
+        self._check(self._library.setae_world_add_box(self._live, centre, edges, yaw_rad))
+
+    def start(self, arm_mm: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        """Switch the power on, with the origin of frame D at `arm_mm` in the world.
+
+        Raises
+        ------
+        InputError
+            Two parameters contradict each other; the message names them.
+        SimulationError
+            The spring has no equilibrium with these parameters.
+        """
+        self._check(self._library.setae_world_start(self._live, _vector("arm_mm", arm_mm)))
+
+    @property
+    def now_us(self) -> int:
+        """Virtual time since power-on."""
+        return int(self._library.setae_world_now_us(self._live))
+
+    def send(self, data: bytes) -> None:
+        """Put bytes on the line to the board now."""
+        self._check(self._library.setae_world_send(self._live, data, len(data)))
+
+    def run(self, until_us: int) -> bytes:
+        """Step until bytes for the host are there, or the time has come.
+
+        How a wait is cut into calls changes nothing in the world.
+
+        Returns
+        -------
+        bytes
+            Empty when the time has come first.
+
+        Raises
+        ------
+        SimulationError
+            The spring's equilibrium could not be found.
+        """
+        self._size.value = _READ_ROOM
+        self._check(
+            self._library.setae_world_run(
+                self._live, until_us, self._room, ctypes.byref(self._size)
+            )
+        )
+        return self._room.raw[: self._size.value] if self._size.value else b""
+
+    def arm_move(
+        self, target_mm: Sequence[float], speed_mm_s: float, acceleration_mm_s2: float
+    ) -> None:
+        """Start a straight move of the arm, with a trapezoidal speed profile.
+
+        Raises
+        ------
+        InputError
+            A value is no good.
+        SimulationError
+            The arm is moving.
+        """
+        target = _vector("target_mm", target_mm)
+        self._check(
+            self._library.setae_world_arm_move(self._live, target, speed_mm_s, acceleration_mm_s2)
+        )
+
+    def arm_stop(self, acceleration_mm_s2: float) -> None:
+        """Brake the arm on its present line."""
+        self._check(self._library.setae_world_arm_stop(self._live, acceleration_mm_s2))
+
+    def truth(self) -> Truth:
+        """Look at the world as it is now; changes nothing in it."""
+        raw = self._truth
+        self._check(self._library.setae_world_truth(self._live, ctypes.byref(raw)))
+        bits = raw.board_attached
+        depth_mm = raw.contact_depth_mm
+        return Truth(
+            time_us=raw.time_us,
+            arm_mm=np.array(raw.arm_mm),
+            arm_target_mm=np.array(raw.arm_target_mm),
+            arm_moving=bool(raw.arm_moving),
+            attached=(bool(bits & 1), bool(bits & 2), bool(bits & 4), bool(bits & 8)),
+            pulse_us=np.array(raw.pulse_us),
+            servo_length_mm=np.array(raw.servo_length_mm),
+            tension_n=np.array(raw.tension_n),
+            backbone_mm=np.array(raw.backbone_mm),
+            rotation=np.array(raw.rotation).reshape(3, 3),
+            filament_mm=np.array(raw.filament_mm),
+            contact_depth_mm=depth_mm,
+            contact_point_mm=np.array(raw.contact_point_mm) if depth_mm > 0 else None,
+            pressure_hpa=raw.pressure_hpa,
+            plant_residual=raw.plant_residual,
+        )
+
+    def sensor_fault(self, fault: SensorFault) -> None:
+        """Break the pressure sensor, or mend it."""
+        self._check(self._library.setae_world_sensor_fault(self._live, int(fault)))
+
+    def reset_board(self) -> None:
+        """Press the reset button: the board starts anew, its retained memory survives."""
+        self._check(self._library.setae_world_reset_board(self._live))
+
+    def close(self) -> None:
+        """Let go of the world. Closing twice is fine."""
+        if self._handle:
+            self._library.setae_world_destroy(self._handle)
+            self._handle = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", None):
+            self.close()
+
+    @property
+    def _live(self) -> int:
+        if self._handle is None:
+            raise SimulationError("The simulated world was closed.", "Make a new one.")
+        return self._handle
+
+    def _check(self, status: int) -> None:
+        if status == 0:
+            return
+        text = self._library.setae_world_error(self._live).decode()
+        problem = f"Simulator: {text}."
+        if status == _BAD_ARGUMENT:
+            raise InputError(problem)
+        raise SimulationError(problem)
