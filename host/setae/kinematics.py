@@ -45,7 +45,7 @@ def inverse(position_mm: npt.ArrayLike) -> Arc:
     >>> float(arc.length_mm), arc.bend_rad.tolist()
     (60.0, [0.0, 0.0])
     >>> round(float(inverse((15, 0, 60)).length_mm), 3)
-    62.467
+    62.47
     """
     p = finite_array("position_mm", position_mm, last_axis=3, what="x, y, z")
     x, y, z = p[..., 0], p[..., 1], p[..., 2]
