@@ -28,9 +28,7 @@ from setae.link.transport import Transport
 from setae.record import Recorder
 from setae.robot import Robot
 from setae.scene import Scene, tube_scene
-from setae.sim.stage import SimulatedStage
-from setae.sim.transport import SimTransport
-from setae.sim.world import World
+from setae.sim import SimTransport, SimulatedStage, World
 from setae.stage import ManualStage, Stage
 from setae_protocol.messages import (
     PRESSURE_LSB_PER_HPA,
@@ -457,7 +455,9 @@ class _Log:
             filament_mm=truth.filament_mm,
             arm_mm=truth.arm_mm,
             contact_depth_mm=truth.contact_depth_mm,
-            contact_point_mm=truth.contact_point_mm,
+            contact_point_mm=np.full(3, np.nan)
+            if truth.contact_point_mm is None
+            else truth.contact_point_mm,
             tension_n=truth.tension_n,
             pressure_hpa=truth.pressure_hpa,
         )

@@ -29,6 +29,7 @@ from setae.errors import (
     PoseUnknownError,
     RefusedError,
     StoppedError,
+    TrajectoryError,
     TrippedError,
 )
 from setae.link.events import (
@@ -42,7 +43,6 @@ from setae.link.session import Session, refused_error
 from setae_protocol.messages import (
     PRESSURE_LSB_PER_HPA,
     SERVO_FRAME_US,
-    SERVOS,
     Disarm,
     Enable,
     Guard,
@@ -75,6 +75,7 @@ _TARE_ATTEMPTS = 4
 _TARE_S = 0.5
 _RETRIED = (Refusal.TARE_NOISY, Refusal.TARE_FAR)
 _GUARD_FRAMES_MAX = 0xFFFF
+_LONG_MOTION_FRAMES = 20
 
 Ticks = tuple[int, int, int, int]
 OnCommand = Callable[[str, Mapping[str, Any]], None]
@@ -303,7 +304,7 @@ class Robot:
             return
         if self.state is State.TRIPPED:
             self._wait(
-                lambda: not self.telemetry.reflex_running,
+                lambda: self.state is not State.TRIPPED or self._reflex_ended(),
                 _REPLY_S + 60.0,
                 "the reflex to end",
                 watch=False,
@@ -644,7 +645,26 @@ class Robot:
         speed_mm_s: float | None,
     ) -> tuple[list[Segment], float]:
         """Segments from the present pulses to tendon lengths, and the time they take."""
-        raise NotImplementedError
+        limit = self._servos.max_speed_mm_s
+        if duration_s is not None and speed_mm_s is not None:
+            raise InputError("Both duration_s and speed_mm_s are given.", "Give one of them.")
+        if duration_s is None:
+            speed = _positive("speed_mm_s", speed_mm_s or self.config.motion.move_speed_mm_s)
+            if speed > limit.min():
+                raise TrajectoryError(
+                    f"{speed:g} mm/s is faster than the servos' {limit.min():.0f} mm/s.",
+                    "Give a lower speed.",
+                )
+            limit = np.minimum(limit, speed)
+        if self._ticks_for(lengths_mm) == self._ticks_now():
+            return [], 0.0
+        motion = trajectory.line(
+            self.lengths_mm, lengths_mm, max_speed_mm_s=limit, duration_s=duration_s
+        )
+        # Two frames a segment halve the traffic; the straight line between is within a tick.
+        frames_each = 2 if motion.frames >= _LONG_MOTION_FRAMES else 1
+        segments = self._servos.segments(motion.lengths_mm, frames_each=frames_each)
+        return list(segments), motion.duration_s
 
     # ------------------------------------------------------------------- waiting
 
@@ -740,6 +760,13 @@ class Robot:
             self._trip = event
         elif isinstance(event, FaultReported) and not event.earlier:
             self._fault = event
+
+    def _reflex_ended(self) -> bool:
+        # The latest report may be from before the trip.
+        last = self._telemetry
+        return (
+            last is not None and last.state is State.TRIPPED and not last.telemetry.reflex_running
+        )
 
     def _wait_for_telemetry(self) -> None:
         """Wait for a report that was made after now."""

@@ -229,7 +229,8 @@ def _check_board(where: Where, checks: _Checks) -> str:
     with _connect(where, leave="hold") as robot:
         _check_reset(robot, checks)
         _check_pressure(robot, checks)
-        return f"firmware {robot.firmware_version} on {robot.session.transport.name}, limits as configured"
+        port = robot.session.transport.name
+        return f"firmware {robot.firmware_version} on {port}, limits as configured"
 
 
 def _check_reset(robot: Robot, checks: _Checks) -> None:
