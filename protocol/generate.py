@@ -673,7 +673,12 @@ def python_module() -> str:
                 entry = f"        {codes.name}.{code.name.upper()}: {text},"
                 if len(entry) > 100:
                     lines += [f"        {codes.name}.{code.name.upper()}: ("]
-                    lines += python_string(getattr(code, attribute), "            ")
+                    whole = "            " + text
+                    lines += (
+                        [whole]
+                        if len(whole) <= 100
+                        else python_string(getattr(code, attribute), "            ")
+                    )
                     lines += ["        ),"]
                 else:
                     lines.append(entry)
@@ -698,7 +703,11 @@ def python_module() -> str:
     for side, from_host in (("Host", True), ("Board", False)):
         names = [m.name for m in MESSAGES if m.from_host == from_host]
         lines += ["", "", f"{side}Message: TypeAlias = ("]
-        lines += [f"    {'| ' if i else ''}{name}" for i, name in enumerate(names)]
+        whole = "    " + " | ".join(names)
+        if len(whole) <= 100:
+            lines.append(whole)
+        else:
+            lines += [f"    {'| ' if i else ''}{name}" for i, name in enumerate(names)]
         lines += [")", f'"""Any message from the {side.lower()}."""']
     for side, from_host in (("Host", True), ("Board", False)):
         lines += [

@@ -236,8 +236,7 @@ _FAULT_REMEDY: Mapping[Fault, str] = MappingProxyType(
         Fault.SENSOR_WRONG: "Check which sensor is wired to the bus.",
         Fault.SENSOR_SILENT: "Check the sensor's cable; a loose one fails when the robot bends.",
         Fault.SENSOR_BUS: (
-            "Check the pull-ups and keep the cable shorter than 30 cm, away from the servo "
-            "leads."
+            "Check the pull-ups and keep the cable shorter than 30 cm, away from the servo leads."
         ),
         Fault.SENSOR_RANGE: "Check that the silicone does not press on the sensor's port.",
         Fault.WATCHDOG: "Report it with the log; power the board off and on before the next run.",
@@ -1863,14 +1862,7 @@ HostMessage: TypeAlias = (
 
 
 BoardMessage: TypeAlias = (
-    HelloReply
-    | Receipt
-    | Pong
-    | Telemetry
-    | Trip
-    | FaultMessage
-    | RefusalMessage
-    | Limits
+    HelloReply | Receipt | Pong | Telemetry | Trip | FaultMessage | RefusalMessage | Limits
 )
 """Any message from the board."""
 

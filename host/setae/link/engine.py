@@ -170,6 +170,7 @@ class Engine:
         # Handshake.
         self._hello_token: int | None = None
         self._settle_token: int | None = None
+        self._settled = False
         self._repeat_at_us = 0
         self._wanted_session = 0
         # Reliable commands.
@@ -488,12 +489,10 @@ class Engine:
         if fresh:
             self._on_header(header, now_us)
         self._on_message(message, header, now_us, fresh=fresh)
-        if fresh:
-            self._confirm()
-            if isinstance(message, Receipt) and message.gap and self._flight:
-                since = self._resent_at_us
-                if since is None or now_us - since >= (self._srtt_us or _RTO_FLOOR_US):
-                    self._retransmit(now_us)
+        if fresh and isinstance(message, Receipt) and message.gap and self._flight:
+            since = self._resent_at_us
+            if since is None or now_us - since >= (self._srtt_us or _RTO_FLOOR_US):
+                self._retransmit(now_us)
 
     def _on_hello(self, header: BoardHeader, reply: HelloReply, now_us: int) -> None:
         if self.phase in (Phase.SETTLING, Phase.OPEN) and header.session == self.session:
@@ -555,6 +554,7 @@ class Engine:
             self.statistics.frames_lost += (step - 1) & 0xFF
             self._gaps += 1
             for item in self._unconfirmed:
+                item.certain = False
                 item.clean_from_frame = None
         self._last_sequence = sequence
         self._heard_at_us = now_us
@@ -596,17 +596,22 @@ class Engine:
         certain = item.gaps_when_sent == self._gaps
         self._unconfirmed.append(_Unconfirmed(ticket, end, epoch, certain))
 
-    def _confirm(self) -> None:
-        """Settle the tickets of which no refusal can come any more."""
-        frame = self.telemetry.frame if self.telemetry is not None else 0
+    def _confirm(self, frame: int) -> None:
+        """Settle the tickets of which no refusal can come any more.
+
+        The board sends the record of a refusal ahead of its next telemetry, and
+        repeats it until it is acknowledged. So no refusal is on its way where
+        telemetry has come and no board frame was lost since the command was
+        sent; or, where one was, after as many frames without a loss as lie
+        between two repeats.
+        """
         still = []
         for item in self._unconfirmed:
             if item.ticket.done:
                 continue
             if item.clean_from_frame is None:
                 item.clean_from_frame = frame
-            # An unacknowledged record is repeated, so this many frames without a gap hold it.
-            if item.certain or frame - item.clean_from_frame > RECORD_REPEAT_FRAMES + 1:
+            if item.certain or frame - item.clean_from_frame > RECORD_REPEAT_FRAMES:
                 item.ticket.state = item.end
                 if item.end is TicketState.DISCARDED:
                     item.ticket.discarded_by_epoch = item.epoch
@@ -649,6 +654,9 @@ class Engine:
         )
         if self._stop is not None and message.stop_number == self._stop_number:
             self._stop_done()
+        self._confirm(message.frame)
+        if self.phase is Phase.SETTLING and self._settled:
+            self._opened()
 
     def _note_time(self, message: Telemetry | Pong, size: int, now_us: int) -> int:
         board_us = message.frame * SERVO_FRAME_US + message.phase_us
@@ -664,13 +672,18 @@ class Engine:
         line_us = (HOST_OVERHEAD_BYTES + Ping.SIZE) * _MICROSECONDS_PER_BYTE
         self.clock.add_sent(sent_us=sent_us + line_us, board_us=board_us)
         if self.phase is Phase.SETTLING and message.token == self._settle_token:
-            assert self.hello is not None
             if self._srtt_us is None:
                 self._measure(now_us - sent_us)
                 self._rto_us = self._rto_from_estimate()
-            self.phase = Phase.OPEN
-            self._discard_queued()
-            self._events.append(Opened(self.session, self.hello))
+            self._settled = True
+            if self.telemetry is not None:
+                self._opened()
+
+    def _opened(self) -> None:
+        assert self.hello is not None
+        self.phase = Phase.OPEN
+        self._discard_queued()
+        self._events.append(Opened(self.session, self.hello))
 
     def _on_record(self, message: RecordMessage, now_us: int) -> None:
         kind = {Trip: Record.TRIP, FaultMessage: Record.FAULT, RefusalMessage: Record.REFUSAL}[

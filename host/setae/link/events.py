@@ -45,7 +45,7 @@ class TicketState(Enum):
     REFUSED = "refused"
     """Not carried out; `Ticket.refusal` says why."""
     DISCARDED = "discarded"
-    """Belonged to an epoch that a stop, trip, fault or refusal had ended."""
+    """Its epoch ended first, by a stop, trip, fault or refusal: it never ran, or was dropped."""
     FAILED = "failed"
     """The link failed first: it may have been carried out or not."""
 

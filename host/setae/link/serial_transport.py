@@ -28,7 +28,7 @@ class SerialTransport:
     Parameters
     ----------
     port
-        Such as ``/dev/ttyACM0``, or a pyserial URL.
+        Such as ``/dev/ttyACM0``.
 
     Raises
     ------
@@ -104,9 +104,9 @@ class SerialTransport:
         return LinkLostError(f"The port {self._name} is gone ({error}).")
 
 
-def _open(port: str) -> serial.SerialBase:
+def _open(port: str) -> serial.Serial:
     try:
-        return serial.serial_for_url(
+        return serial.Serial(
             port,
             baudrate=BAUD,
             timeout=_READ_TIMEOUT_S,
