@@ -64,6 +64,30 @@ def origin_note(trials: Sequence[Trial]) -> str:
     return "simulated" if seed is None else f"simulated, seed {seed}"
 
 
+def write_all(folder: Path, trials: Sequence[Trial]) -> tuple[Path, ...]:
+    """Write the still pictures of a run into a folder, those that its logs have data for."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shown = telling(trials)
+    written = []
+    if shown.motion is not None:
+        robot_picture(folder / "robot.png", shown)
+        written.append(folder / "robot.png")
+    for name, draw in (
+        ("pressure", lambda path: pressure_picture(path, shown)),
+        ("directions", lambda path: directions_picture(path, trials)),
+        ("trials", lambda path: trials_picture(path, trials)),
+    ):
+        draw(folder / f"{name}.png")
+        written.append(folder / f"{name}.png")
+    return tuple(written)
+
+
+def telling(trials: Sequence[Trial]) -> Trial:
+    """Choose the trial that shows most: the second with a touch, so that one sees the way."""
+    touched = [trial for trial in trials if trial.touched]
+    return touched[min(1, len(touched) - 1)] if touched else trials[0]
+
+
 # ------------------------------------------------------------------------ the robot
 
 

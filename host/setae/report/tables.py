@@ -44,6 +44,14 @@ def compare(trials: Sequence[Trial]) -> tuple[Comparison, ...]:
     return tuple(rows)
 
 
+def write_all(folder: Path, trials: Sequence[Trial]) -> tuple[Path, ...]:
+    """Write all tables into a folder."""
+    paths = tuple(folder / f"{name}.csv" for name in ("trials", "contacts", "pressure"))
+    for path, write in zip(paths, (write_trials, write_contacts, write_pressure), strict=True):
+        write(path, trials)
+    return paths
+
+
 def write_trials(path: Path, trials: Sequence[Trial]) -> None:
     """One row a trial."""
     _write(
@@ -81,7 +89,7 @@ def write_contacts(path: Path, trials: Sequence[Trial]) -> None:
         (
             "trial", "contact", "time_s", "descent_mm", "alpha_deg", "pressure_hpa",
             "baseline_hpa", "change_hpa", "tip_x_mm", "tip_y_mm", "tip_z_mm",
-            "true_x_mm", "true_y_mm", "true_z_mm",
+            "tip_uncertainty_mm", "true_x_mm", "true_y_mm", "true_z_mm",
         ),
         (
             (trial.number, index, *_contact_row(trial, contact))
@@ -100,6 +108,7 @@ def _contact_row(trial: Trial, contact: Contact) -> tuple[str, ...]:
         _number(contact.baseline_hpa, 4),
         _number(contact.change_hpa, 4),
         *(_number(value, 2) for value in contact.point_mm),
+        _number(contact.uncertainty_mm, 2),
         *(_number(value, 2) for value in contact.true_point_mm),
     )
 

@@ -10,12 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from setae.errors import LogError
+from setae import kinematics
+from setae.arc import Arc
+from setae.config import Config, loads
+from setae.errors import ConfigError, InputError, LogError
 from setae.record import Log
+from setae.servo import ServoModel
 
 Floats = NDArray[np.float64]
 
-DEFAULT_THRESHOLD_HPA = 15.0  # the paper's; a log's own configuration comes first
+BACKBONE_POINTS = 21  # of a shape that is drawn from commanded pulses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,10 +48,13 @@ class Contact:
     time_us
         Time of the deciding pressure sample where the log has it.
     descent_mm, alpha_deg
-        The level and the direction in which it happened.
+        The level and the direction in which it happened; `alpha_deg` is None
+        for a touch while the arm went down.
     point_mm
         (3,) the bristle's tip in the world, as the robot estimates it; NaN
         where the log has no estimate.
+    uncertainty_mm
+        Of the estimate; NaN where the log doesn't say.
     true_point_mm
         (3,) where the simulated bristle touched, in the world; NaN where the
         log isn't of a simulation.
@@ -57,8 +64,9 @@ class Contact:
 
     time_us: int
     descent_mm: float
-    alpha_deg: float
+    alpha_deg: float | None
     point_mm: Floats
+    uncertainty_mm: float
     true_point_mm: Floats
     pressure_hpa: float
     baseline_hpa: float
@@ -96,6 +104,9 @@ class Motion:
 
     Attributes
     ----------
+    measured
+        True for a simulation's own shape; False for the shape that the
+        commanded pulses ask for, which is all that a real robot can tell.
     time_us
         (n,)
     arm_mm
@@ -106,6 +117,7 @@ class Motion:
         (n, 2, 3) the undeformed bristle, root and tip.
     """
 
+    measured: bool
     time_us: NDArray[np.int64]
     arm_mm: Floats
     backbone_mm: Floats
@@ -131,35 +143,51 @@ class Trial:
         The answer: the depth at which the robot ended its way down.
     complete
         Whether the log holds the trial's end.
+    problem
+        Why it doesn't, where that is known; else empty.
+    config
+        The robot's configuration in the run.
+    lowering_contact
+        A touch while the arm went down, which ends the way down at once.
     """
 
     number: int
     obstacle_below_tip_mm: float | None
     descent_mm: float
     complete: bool
+    problem: str
     start_us: int
     end_us: int
     levels: tuple[Level, ...]
+    lowering_contact: Contact | None
     tube: Tube | None
     cube: Cube | None
     motion: Motion | None
-    threshold_hpa: float
+    config: Config
     log: Log
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """All touches, in order."""
-        return tuple(
+        found = [
             direction.contact
             for level in self.levels
             for direction in level.directions
             if direction.contact is not None
-        )
+        ]
+        if self.lowering_contact is not None:
+            found.append(self.lowering_contact)
+        return tuple(sorted(found, key=lambda contact: contact.time_us))
 
     @property
     def touched(self) -> bool:
         """Whether anything was touched at all."""
-        return any(direction.touched for level in self.levels for direction in level.directions)
+        return bool(self.contacts)
+
+    @property
+    def threshold_hpa(self) -> float:
+        """Change of pressure that counts as a touch."""
+        return self.config.bristle.threshold_hpa
 
     @property
     def simulated(self) -> bool:
@@ -198,26 +226,45 @@ def load(log: Log, *, number: int = 1) -> Trial:
             f"{log.path} holds no exploration.", "Give the log of a run of `setae explore`."
         )
     start = starts[0]
-    about = {**log.metadata, **start.data}
     ends = [event for event in events if event.name == "trial_end"]
+    aborts = [event for event in events if event.name == "trial_aborted"]
     levels = _levels(log)
     deepest_mm = max((level.descent_mm for level in levels), default=0.0)
-    obstacle = about.get("obstacle_below_tip_mm")
-    scene = about.get("scene") or {}
+    scene = log.metadata.get("scene") or {}
+    config = _config(log)
     return Trial(
-        number=int(about.get("trial") or number),
-        obstacle_below_tip_mm=None if obstacle is None else float(obstacle),
+        number=int(log.metadata.get("trial") or number),
+        obstacle_below_tip_mm=_obstacle_below_tip_mm({**log.metadata, **start.data}),
         descent_mm=float(ends[-1].data.get("descent_mm", deepest_mm)) if ends else deepest_mm,
         complete=bool(ends),
+        problem=str(aborts[-1].data.get("reason", "")) if aborts else "",
         start_us=start.time_us,
         end_us=ends[-1].time_us if ends else log.span_us[1],
         levels=levels,
+        lowering_contact=_lowering_contact(log),
         tube=_tube(scene),
         cube=_cube(scene),
-        motion=_motion(log),
-        threshold_hpa=_threshold_hpa(log),
+        motion=_motion(log, config),
+        config=config,
         log=log,
     )
+
+
+def _obstacle_below_tip_mm(about: Mapping[str, Any]) -> float | None:
+    below_mm = about.get("obstacle_below_tip_mm")
+    obstacle = about.get("obstacle")
+    if below_mm is None and isinstance(obstacle, Mapping):
+        below_mm = obstacle.get("below_tip_mm")
+    return None if below_mm is None else float(below_mm)
+
+
+def _lowering_contact(log: Log) -> Contact | None:
+    for event in log.events("lowering_contact"):
+        estimate = event.data.get("contact") or event.data
+        descent_mm = float(estimate.get("descent_mm", math.nan))
+        start_us = int(estimate.get("time_us", event.time_us)) - 1_000_000
+        return _contact(log, estimate, start_us, event.time_us, descent_mm, None)
+    return None
 
 
 def _levels(log: Log) -> tuple[Level, ...]:
@@ -278,7 +325,7 @@ def _contact(
     start_us: int,
     end_us: int,
     descent_mm: float,
-    alpha_deg: float,
+    alpha_deg: float | None,
 ) -> Contact:
     """Gather a contact from the estimate, the trip record and the truth around it."""
     about: dict[str, Any] = {}
@@ -290,7 +337,9 @@ def _contact(
     time_us = int(about.get("time_us", end_us))
 
     point_mm = np.full(3, np.nan)
-    if about.get("tip_mm") is not None:
+    if about.get("tip_world_mm") is not None:
+        point_mm = np.array(about["tip_world_mm"], dtype=float)
+    elif about.get("tip_mm") is not None:
         point_mm = to_world(about["tip_mm"], _arm_mm(log, time_us))
 
     true_point_mm = np.full(3, np.nan)
@@ -307,6 +356,7 @@ def _contact(
         descent_mm=descent_mm,
         alpha_deg=alpha_deg,
         point_mm=point_mm,
+        uncertainty_mm=float(about.get("uncertainty_mm", math.nan)),
         true_point_mm=true_point_mm,
         pressure_hpa=float(about.get("pressure_hpa", math.nan)),
         baseline_hpa=float(about.get("baseline_hpa", math.nan)),
@@ -323,13 +373,14 @@ def _arm_mm(log: Log, time_us: int) -> Floats:
     return np.zeros(3)
 
 
-def _motion(log: Log) -> Motion | None:
+def _motion(log: Log, config: Config) -> Motion | None:
     times = log.times_us("/truth")
     if not times.size:
-        return None
+        return _commanded_motion(log, config)
     order = np.argsort(times, kind="stable")
     arm_mm = log.array("/truth", "arm_mm")[order]
     return Motion(
+        measured=True,
         time_us=times[order],
         arm_mm=arm_mm,
         backbone_mm=to_world(log.array("/truth", "backbone_mm")[order], arm_mm[:, None]),
@@ -337,14 +388,59 @@ def _motion(log: Log) -> Motion | None:
     )
 
 
-def _threshold_hpa(log: Log) -> float:
-    import tomllib
-
+def _commanded_motion(log: Log, config: Config) -> Motion | None:
+    """Shapes of constant curvature from the pulses, while all servos had one."""
+    pulse_us = log.array("/telemetry", "pulse_us")
+    times_us = log.times_us("/telemetry")
+    attached = np.flatnonzero((pulse_us > 0).all(axis=1)) if pulse_us.size else np.array([], int)
+    if not attached.size:
+        return None
+    times_us = times_us[attached]
+    lengths_mm = ServoModel(config).lengths_from_us(pulse_us[attached])
     try:
-        config = tomllib.loads(str(log.metadata.get("config", "")))
-    except tomllib.TOMLDecodeError:
-        return DEFAULT_THRESHOLD_HPA
-    return float(config.get("bristle", {}).get("threshold_hpa", DEFAULT_THRESHOLD_HPA))
+        arc = kinematics.forward(lengths_mm, config.geometry, model="parallel")
+    except InputError:  # pulses of another robot than the configuration's
+        return None
+    part = np.linspace(0.0, 1.0, BACKBONE_POINTS)
+    along = Arc(
+        length_mm=np.maximum(arc.length_mm[:, None] * part, 1e-6),
+        bend_rad=arc.bend_rad[:, None, :] * part[:, None],
+    )
+    geometry = config.geometry
+    filament_mm = np.stack(
+        [
+            kinematics.position(arc, tip_offset_mm=offset_mm)
+            for offset_mm in (
+                geometry.tip_offset_mm - geometry.filament_length_mm,
+                geometry.tip_offset_mm,
+            )
+        ],
+        axis=1,
+    )
+    arm_mm = _arm_path(log, times_us)
+    return Motion(
+        measured=False,
+        time_us=times_us,
+        arm_mm=arm_mm,
+        backbone_mm=to_world(kinematics.position(along), arm_mm[:, None]),
+        filament_mm=to_world(filament_mm, arm_mm[:, None]),
+    )
+
+
+def _arm_path(log: Log, times_us: NDArray[np.int64]) -> Floats:
+    known_us = log.times_us("/stage")
+    if not known_us.size:
+        return np.zeros((len(times_us), 3))
+    position = log.array("/stage", "position_mm")
+    return np.stack([np.interp(times_us, known_us, axis) for axis in position.T], axis=1)
+
+
+def _config(log: Log) -> Config:
+    """Return the run's configuration; the default where the log has none that fits."""
+    try:
+        return loads(str(log.metadata.get("config", "")), source=str(log.path))
+    except ConfigError:
+        return loads("")
 
 
 def _tube(scene: Mapping[str, Any]) -> Tube | None:
