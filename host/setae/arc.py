@@ -171,6 +171,20 @@ class Arc:
         """Direction α of the bending, shape (...); 0 where the spring is straight."""
         return np.asarray(np.arctan2(self.bend_rad[..., 1], self.bend_rad[..., 0]))
 
+    @property
+    def top_mm(self) -> FloatArray:
+        """Where the arc ends, the position of U in frame D, shape (..., 3): equation 4."""
+        theta = self.theta_rad
+        # r(1 − cos θ) = L θ·½ sinc²(θ/2), and r sin θ = L sinc θ.
+        lateral = self.length_mm * 0.5 * sinc(theta / 2) ** 2
+        return np.concatenate(
+            [
+                lateral[..., np.newaxis] * self.bend_rad,
+                (self.length_mm * sinc(theta))[..., np.newaxis],
+            ],
+            axis=-1,
+        )
+
     def __getitem__(self, index: object) -> Arc:
         """Some of the poses, by an index into (...)."""
         key = index if isinstance(index, tuple) else (index,)

@@ -87,17 +87,9 @@ def position(arc: Arc, *, tip_offset_mm: npt.ArrayLike = 0.0) -> FloatArray:
     [0.0, 0.0, 125.0]
     """
     offset = finite_array("tip_offset_mm", tip_offset_mm)
-    theta = arc.theta_rad
-    b = sinc(theta)
-    a = 0.5 * sinc(theta / 2) ** 2
-    lateral = arc.length_mm * a + offset * b
-    return np.concatenate(
-        [
-            lateral[..., np.newaxis] * arc.bend_rad,
-            (arc.length_mm * b + offset * np.cos(theta))[..., np.newaxis],
-        ],
-        axis=-1,
-    )
+    theta = arc.theta_rad[..., np.newaxis]
+    axis = np.concatenate([sinc(theta) * arc.bend_rad, np.cos(theta)], axis=-1)
+    return np.asarray(arc.top_mm + offset[..., np.newaxis] * axis)
 
 
 def transform(arc: Arc, *, tip_offset_mm: npt.ArrayLike = 0.0) -> FloatArray:
@@ -138,7 +130,14 @@ def transform(arc: Arc, *, tip_offset_mm: npt.ArrayLike = 0.0) -> FloatArray:
     return result
 
 
-def forward(lengths_mm: npt.ArrayLike, geometry: Geometry, model: str = "parallel") -> Arc:
+def forward(
+    lengths_mm: npt.ArrayLike,
+    geometry: Geometry,
+    model: str = "parallel",
+    *,
+    near: Arc | None = None,
+    tolerance_mm: float = 0.1,
+) -> Arc:
     """Find the arc whose tendons come closest to given lengths.
 
     Parameters
@@ -149,6 +148,14 @@ def forward(lengths_mm: npt.ArrayLike, geometry: Geometry, model: str = "paralle
         With n tendons at three different angles or more.
     model
         Tendon model, see `setae.tendons`.
+    near
+        An arc that is expected, such as the commanded one; of shape (...) or ().
+        With ``paper``, arcs more than 20 mm apart can have lengths that agree to
+        0.1 mm, so rounding alone may choose the wrong one: with lengths that are
+        rounded or measured, pass it.
+    tolerance_mm
+        How far the lengths may be off (root mean square): a fit worse than the best
+        by up to this may win for being closer to `near`.
 
     Returns
     -------
@@ -176,4 +183,15 @@ def forward(lengths_mm: npt.ArrayLike, geometry: Geometry, model: str = "paralle
         raise InputError(
             f"lengths_mm{first_place(bad)} is {q[bad][0]:g}.", "A tendon's length is above 0."
         )
-    return tendons.model(model).fit(q, geometry)
+    hint = None
+    if near is not None:
+        tolerance = finite_array("tolerance_mm", tolerance_mm)
+        try:
+            np.broadcast_to(near.length_mm, q.shape[:-1])
+        except ValueError:
+            raise InputError(
+                f"near has shape {near.shape} and lengths_mm {q.shape}.",
+                f"The shape of near must be {q.shape[:-1]} or ().",
+            ) from None
+        hint = tendons.Hint(near, float(tolerance))
+    return tendons.model(model).fit(q, geometry, hint)

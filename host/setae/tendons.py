@@ -30,7 +30,7 @@ from setae.arc import Arc, FloatArray, first_place, sinc
 from setae.config import Geometry
 from setae.errors import InputError
 
-__all__ = ["BOUNDARY_TOLERANCE", "MODELS", "TendonModel", "lengths", "model"]
+__all__ = ["BOUNDARY_TOLERANCE", "MODELS", "Hint", "TendonModel", "lengths", "model"]
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
@@ -54,7 +54,8 @@ class TendonModel:
     lengths
         Arc of shape (...) → lengths in mm, shape (..., n).
     fit
-        Lengths in mm, shape (..., n) → the arc of least squares, shape (...).
+        Lengths in mm, shape (..., n), and a hint → the arc of least squares, shape
+        (...). A rule for which several arcs fit almost equally well follows the hint.
     pieces
         Arc of shape (...) → which piece of the rule each tendon is in, bool of
         shape (..., n). Only where two neighbouring arcs differ in it may the
@@ -63,8 +64,25 @@ class TendonModel:
 
     name: str
     lengths: Callable[[Arc, Geometry], FloatArray]
-    fit: Callable[[FloatArray, Geometry], Arc]
+    fit: Callable[[FloatArray, Geometry, Hint | None], Arc]
     pieces: Callable[[Arc, Geometry], BoolArray]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hint:
+    """Where an arc is expected.
+
+    Attributes
+    ----------
+    arc
+        The expectation; its shape must broadcast to that of the lengths.
+    tolerance_mm
+        An arc that fits worse than the best by up to this (root mean square over the
+        tendons) may win for being closer to the expectation.
+    """
+
+    arc: Arc
+    tolerance_mm: float
 
 
 def lengths(arc: Arc, geometry: Geometry, model: str = "paper") -> FloatArray:
@@ -176,7 +194,8 @@ def _fitted(length: FloatArray, bend: FloatArray) -> Arc:
     return Arc(length_mm=length, bend_rad=bend)
 
 
-def _parallel_fit(q: FloatArray, geometry: Geometry) -> Arc:
+def _parallel_fit(q: FloatArray, geometry: Geometry, hint: Hint | None) -> Arc:
+    del hint  # there is only one solution
     return _fitted(*_parallel_solution(q, geometry))
 
 
@@ -237,7 +256,7 @@ def _paper_rule(
     return np.where(inner, arc, chord), derivative
 
 
-def _paper_fit(q: FloatArray, geometry: Geometry) -> Arc:
+def _paper_fit(q: FloatArray, geometry: Geometry, hint: Hint | None) -> Arc:
     """Least squares over all pieces of equation 12.
 
     The rule is smooth while no tendon changes sides, so the direction α is cut
@@ -247,15 +266,26 @@ def _paper_fit(q: FloatArray, geometry: Geometry) -> Arc:
     """
     shape = q.shape[:-1]
     q = q.reshape(-1, geometry.tendon_count)
+    expected: FloatArray | None = None
+    tolerance_mm = 0.0
+    if hint is not None:
+        tolerance_mm = hint.tolerance_mm
+        expected = np.broadcast_to(hint.arc.top_mm, (*shape, 3)).reshape(-1, 3)
     # In blocks: each candidate of each pose holds some hundred bytes.
-    blocks = [_paper_fit_block(q[i : i + 2048], geometry) for i in range(0, max(len(q), 1), 2048)]
+    blocks = []
+    for first in range(0, max(len(q), 1), 2048):
+        part = slice(first, first + 2048)
+        target = None if expected is None else expected[part]
+        blocks.append(_paper_fit_block(q[part], geometry, target, tolerance_mm))
     return _fitted(
         np.concatenate([length for length, _ in blocks]).reshape(shape),
         np.concatenate([bend for _, bend in blocks]).reshape(*shape, 2),
     )
 
 
-def _paper_fit_block(q: FloatArray, geometry: Geometry) -> tuple[FloatArray, FloatArray]:
+def _paper_fit_block(
+    q: FloatArray, geometry: Geometry, expected_mm: FloatArray | None, tolerance_mm: float
+) -> tuple[FloatArray, FloatArray]:
     """`_paper_fit` for q of shape (p, n): L (p,) and Δ (p, 2)."""
     length, bend = _parallel_solution(q, geometry)
     inner, basis, free = _paper_pieces(geometry)
@@ -272,9 +302,16 @@ def _paper_fit_block(q: FloatArray, geometry: Geometry) -> tuple[FloatArray, Flo
         geometry,
         rounds=6,
     )
-    bend = np.einsum("cpj,cij->cpi", along, basis)
-    candidates = Arc(length_mm=length, bend_rad=bend)
-    error = np.sum((_paper_lengths(candidates, geometry) - q) ** 2, axis=-1)
+    candidates = Arc(length_mm=length, bend_rad=np.einsum("cpj,cij->cpi", along, basis))
+    error = np.sqrt(np.mean((_paper_lengths(candidates, geometry) - q) ** 2, axis=-1))
+    if expected_mm is not None:
+        top = candidates.top_mm
+        distance = np.linalg.norm(top - expected_mm, axis=-1)
+        distance[error > error.min(axis=0) + tolerance_mm] = np.inf
+        nearest = np.take_along_axis(top, np.argmin(distance, axis=0)[every, :, every], axis=0)
+        # Neighbouring pieces give almost the same arc: of those the best fit counts.
+        far = np.linalg.norm(top - nearest, axis=-1) > 2.0
+        error = np.where(far | np.isinf(distance), np.inf, error)
     best, pose = np.argmin(error, axis=0), np.arange(len(q))
     length, along = _paper_newton(
         q,
