@@ -232,7 +232,7 @@ class ModelBoard:
             )  # fmt: skip
         else:
             self.executed.append(message)
-            if isinstance(message, Enable) or isinstance(message, Resume):
+            if isinstance(message, (Enable, Resume)):
                 self.state = State.HOLDING
             elif isinstance(message, Segments):
                 self.queued += message.count
@@ -388,7 +388,8 @@ def test_lost_refusal_is_not_taken_for_success(line: ModelTransport) -> None:
     lossy = LossyTransport(line, seed=1)
     session = Session(lossy, session_id=7)
     session.open()
-    say, lost = line.board.say, []
+    say = line.board.say
+    lost: list[BoardMessage] = []
 
     def lose_first_refusal(message: BoardMessage) -> None:
         if isinstance(message, RefusalMessage) and not lost:
@@ -559,7 +560,7 @@ def test_pulled_cable_is_link_lost(line: ModelTransport, session: Session) -> No
 def test_dead_downlink_is_link_lost_though_telemetry_comes(
     line: ModelTransport, session: Session
 ) -> None:
-    line.board.receive = lambda data: None  # type: ignore[method-assign]  # a fault to inject
+    line.board.decoder.feed = lambda _: []  # type: ignore[method-assign]  # a fault to inject
     with pytest.raises(LinkLostError, match="enable"):
         session.request(Enable(pulse_ticks=POSE), timeout_us=60 * SECOND_US)
     assert line.now_us() < 15 * SECOND_US
