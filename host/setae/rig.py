@@ -8,7 +8,7 @@ package knows whether anything is simulated.
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -23,7 +23,7 @@ from setae.config import Config, load
 from setae.errors import InputError, LogError, PortNotFoundError, StageError
 from setae.link.events import Event, FaultReported, Refused, TelemetryReceived, Tripped
 from setae.link.serial_transport import SerialTransport
-from setae.link.session import Session
+from setae.link.session import Pollable, Session
 from setae.link.transport import Transport
 from setae.record import Recorder
 from setae.robot import Robot
@@ -123,6 +123,7 @@ def connect(
     config: Config | None = None,
     seed: int = 0,
     leave: Leave = "relax",
+    pollables: Sequence[Pollable] = (),
 ) -> Robot:
     """Connect to a robot and give its board the configuration's limits.
 
@@ -137,6 +138,8 @@ def connect(
         Seed of the simulator.
     leave
         What the end of a ``with`` block does to a robot that holds.
+    pollables
+        Looked at whenever the session waits.
 
     Returns
     -------
@@ -156,7 +159,7 @@ def connect(
     ...     robot.position_mm.round().tolist()
     [0.0, 0.0, 60.0]
     """
-    return open(url, config=config, seed=seed, leave=leave, stage=None).robot
+    return open(url, config=config, seed=seed, leave=leave, pollables=pollables).robot
 
 
 def open(  # noqa: A001  # rig.open() is what it does
@@ -167,12 +170,13 @@ def open(  # noqa: A001  # rig.open() is what it does
     scene: Scene | None = None,
     stage: Stage | None = None,
     leave: Leave = "relax",
+    pollables: Sequence[Pollable] = (),
 ) -> Rig:
     """Connect to a robot with its arm.
 
     Parameters
     ----------
-    url, config, seed, leave
+    url, config, seed, leave, pollables
         As in `connect`.
     scene
         What the simulated robot hangs in; None: the empty tube. A real robot
@@ -201,7 +205,7 @@ def open(  # noqa: A001  # rig.open() is what it does
         transport = SerialTransport(url or find_port())
         stage = stage or ManualStage()
         session_id = None
-    session = Session(transport, session_id=session_id, pollables=[stage])
+    session = Session(transport, session_id=session_id, pollables=[stage, *pollables])
     try:
         session.open()
         robot = Robot(session, config, leave=leave)
@@ -358,7 +362,7 @@ class _Log:
         self._rig = rig
         self._robot = rig.robot
         self._stage_due_us = 0
-        self._stage_seen: tuple[object, bool] | None = None
+        self._stage_moving: bool | None = None
         self._frames = 0
         self._robot.on_command = lambda name, args: recorder.command(self._robot.now_us, name, args)
         self._unsubscribe = self._robot.session.subscribe(self._on_event)
@@ -441,11 +445,13 @@ class _Log:
 
     def _stage(self, time_us: int) -> None:
         stage = self._rig.stage
-        seen = (stage.position_mm, stage.moving)
-        if seen != self._stage_seen and (time_us >= self._stage_due_us or not stage.moving):
-            self.recorder.stage(time_us, position_mm=stage.position_mm, moving=stage.moving)
-            self._stage_seen = seen
-            self._stage_due_us = time_us + _STAGE_PERIOD_US
+        moving = stage.moving
+        resting = not moving and self._stage_moving is False
+        if resting or (moving and self._stage_moving and time_us < self._stage_due_us):
+            return
+        self.recorder.stage(time_us, position_mm=stage.position_mm, moving=moving)
+        self._stage_moving = moving
+        self._stage_due_us = time_us + _STAGE_PERIOD_US
 
     def _truth(self, world: World) -> None:
         truth = world.truth()

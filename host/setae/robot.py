@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from enum import IntEnum
+from functools import lru_cache
 from types import TracebackType
 from typing import Any, Literal, Self
 
@@ -78,6 +79,9 @@ _GUARD_FRAMES_MAX = 0xFFFF
 _LONG_MOTION_FRAMES = 20
 
 Ticks = tuple[int, int, int, int]
+# Half a second of work, and the same for every robot of a configuration.
+_board_limits = lru_cache(maxsize=8)(servo.board_limits)
+
 OnCommand = Callable[[str, Mapping[str, Any]], None]
 
 
@@ -125,7 +129,7 @@ class Robot:
             The board isn't relaxed and holds other limits.
         """
         self._wait(lambda: self._telemetry is not None, _REPLY_S, "the board's first telemetry")
-        wanted = servo.board_limits(self.config)
+        wanted = _board_limits(self.config)
         if self.state is State.RELAXED:
             self._request(wanted)
         held = self.session.read_limits()
@@ -215,7 +219,9 @@ class Robot:
     @property
     def pose(self) -> Arc:
         """The commanded pose: the arc that fits the commanded lengths best."""
-        return kinematics.forward(self.lengths_mm, self.config.geometry, model="parallel")
+        return kinematics.forward(
+            self.lengths_mm, self.config.geometry, model=self.config.motion.model
+        )
 
     @property
     def position_mm(self) -> npt.NDArray[np.float64]:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Annotated
 
 from cyclopts import App, Parameter
@@ -62,3 +66,39 @@ class Where:
     def load(self) -> Config:
         """The configuration."""
         return load(self.config)
+
+
+class Interrupts:
+    """Ctrl-C, noticed where the session waits and nowhere else.
+
+    A KeyboardInterrupt in the middle of the link's bookkeeping could leave it in
+    a state in which a stop no longer goes out. So the signal only sets a flag;
+    the session's loop polls it at least every 20 ms.
+    """
+
+    def __init__(self) -> None:
+        self._pending = False
+
+    def poll(self, now_us: int) -> None:
+        """Raise KeyboardInterrupt, once for each Ctrl-C."""
+        del now_us
+        if self._pending:
+            self._pending = False
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Catch Ctrl-C while this lasts."""
+
+        def note(number: int, frame: FrameType | None) -> None:
+            del number, frame
+            self._pending = True
+
+        before = signal.signal(signal.SIGINT, note)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+
+interrupts = Interrupts()

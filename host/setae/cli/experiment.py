@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from setae import rig
-from setae.cli.common import Where, app, console
+from setae.cli.common import Where, app, console, interrupts
 from setae.config import Config
 from setae.errors import InputError, SetaeError
 from setae.experiments.explore import (
@@ -86,9 +86,17 @@ def explore(
         if not simulated:
             stage = ManualStage(ask=console.print)
             _ask_to_place(what)
-        with rig.open(
-            where.url, config=config, seed=where.seed, scene=tube_scene(config, what), stage=stage
-        ) as opened:
+        with (
+            interrupts.caught(),
+            rig.open(
+                where.url,
+                config=config,
+                seed=where.seed,
+                scene=tube_scene(config, what),
+                stage=stage,
+                pollables=[interrupts],
+            ) as opened,
+        ):
             recorder = opened.record(log, metadata={"experiment": "explore", "trial": number})
             logs.append(log)
             opened.robot.enable(accept_jump=accept_jump)

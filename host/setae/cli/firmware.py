@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 from setae import rig
@@ -31,8 +32,9 @@ def flash(*, port: str | None = None, hex_file: Path | None = None) -> None:
     hex_file
         A built firmware to upload with avrdude, instead of building one.
     """
+    tool, folder = _tool(hex_file)
     port = port or rig.find_port()
-    command, folder = _command(port, hex_file)
+    command = [part.replace("{port}", port) for part in tool]
     console.print(f"Running: {' '.join(command)}", soft_wrap=True)
     try:
         done = subprocess.run(command, cwd=folder, timeout=_TIMEOUT_S, check=False)
@@ -49,33 +51,38 @@ def flash(*, port: str | None = None, hex_file: Path | None = None) -> None:
         console.print(f"The board answers: firmware {robot.firmware_version}.")
 
 
-def _command(port: str, hex_file: Path | None) -> tuple[list[str], Path | None]:
-    """What to run, and where."""
+def _tool(hex_file: Path | None) -> tuple[list[str], Path | None]:
+    """What to run, with {port} where the port goes, and in which folder."""
     project = _project()
-    pio = shutil.which("pio") or shutil.which("platformio")
+    pio = _which("pio") or _which("platformio")
     if hex_file is None and pio is not None and project is not None:
-        return [pio, "run", "-e", "uno", "-t", "upload", "--upload-port", port], project
-    if hex_file is None and project is not None:
+        return [pio, "run", "-e", "uno", "-t", "upload", "--upload-port", "{port}"], project
+    if hex_file is not None and not hex_file.is_file():
+        raise SetaeError(f"There is no hex file {hex_file}.", "Give --hex-file an existing one.")
+    if hex_file is None:
+        if project is None:
+            raise SetaeError(
+                "The firmware's sources aren't here: no platformio.ini in this folder or above.",
+                "Run it in the project's folder, or give --hex-file.",
+            )
         hex_file = project / _HEX
-    avrdude = shutil.which("avrdude")
-    if hex_file is not None and hex_file.is_file() and avrdude is not None:
-        return [avrdude, *_AVRDUDE, "-P", port, "-U", f"flash:w:{hex_file}:i"], None
-    if hex_file is not None and hex_file.is_file():
+        if not hex_file.is_file():
+            raise SetaeError(
+                "PlatformIO is missing, and no hex file was built before.",
+                "Install it: pip install platformio.",
+            )
+    avrdude = _which("avrdude")
+    if avrdude is None:
         raise SetaeError(
             "avrdude is missing, which writes a hex file to the board.",
             "Install it (Debian: apt install avrdude), or PlatformIO (pip install platformio).",
         )
-    if hex_file is not None and pio is not None:
-        raise SetaeError(f"There is no hex file {hex_file}.", "Give --hex-file an existing one.")
-    if project is None:
-        raise SetaeError(
-            "The firmware's sources aren't here: no platformio.ini in this folder or above.",
-            "Run it in the project's folder, or give --hex-file.",
-        )
-    raise SetaeError(
-        "PlatformIO is missing, and no hex file was built before.",
-        "Install it: pip install platformio.",
-    )
+    return [avrdude, *_AVRDUDE, "-P", "{port}", "-U", f"flash:w:{hex_file}:i"], None
+
+
+def _which(tool: str) -> str | None:
+    """A tool on the path or, in a virtual environment that isn't active, beside its Python."""
+    return shutil.which(tool) or shutil.which(tool, path=str(Path(sys.executable).parent))
 
 
 def _project() -> Path | None:

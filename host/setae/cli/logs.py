@@ -43,7 +43,7 @@ def replay(log: Path, *, topic: str | None = None) -> None:
     read = record.read(log)
     if topic is not None and topic not in record.TOPICS:
         raise InputError(f"There is no topic {topic!r}.", f"Topics: {', '.join(record.TOPICS)}.")
-    topics = [topic] if topic else ["/command", "/trip", "/fault", "/refusal", "/experiment"]
+    topics = [topic] if topic else ["/experiment", "/command", "/trip", "/fault", "/refusal"]
     rows = sorted(
         ((message["time_us"], name, message) for name in topics for message in read.messages(name)),
         key=lambda row: row[0],

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
 import numpy as np
@@ -12,7 +13,7 @@ from rich.table import Table
 
 import setae
 from setae import rig
-from setae.cli.common import Where, app, console
+from setae.cli.common import Where, app, console, interrupts
 from setae.errors import SetaeError
 from setae.robot import Robot
 from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, ResetCause, Sensor
@@ -53,7 +54,7 @@ def info(*, where: Where | None = None) -> None:
             "state": robot.state.name.lower(),
             "last start": ResetCause(reply.reset_cause).doc,
             "pose": "known" if robot.pose_known else "unknown: the first enable may jump",
-            "sensor": Sensor(reply.sensor).doc,
+            "sensor": _sensor(robot).doc,
             "limits": f"as configured (crc {reply.limits_crc:08x} at connect)",
         }
     for name, value in rows.items():
@@ -258,7 +259,7 @@ def _check_pressure(robot: Robot, checks: _Checks) -> None:
         return robot.now_us >= end_us
 
     robot.wait(done, timeout_s=_PRESSURE_S + 1, what="pressure samples")
-    sensor = Sensor(robot.telemetry.sensor)
+    sensor = robot.telemetry.sensor
     if sensor is not Sensor.OK or not samples:
         checks.bad(
             "sensor",
@@ -273,9 +274,34 @@ def _check_pressure(robot: Robot, checks: _Checks) -> None:
         checks.good("sensor", text)
 
 
-def _connect(where: Where | None, *, leave: rig.Leave) -> Robot:
+# A board that has just started needs this long for its sensor.
+_SENSOR_START_US = 500_000
+
+
+def _sensor(robot: Robot) -> Sensor:
+    end_us = robot.now_us + _SENSOR_START_US
+    robot.wait(
+        lambda: robot.telemetry.sensor is Sensor.OK or robot.now_us >= end_us,
+        timeout_s=1.0,
+        what="the sensor to start",
+    )
+    return robot.telemetry.sensor
+
+
+@contextmanager
+def _connect(where: Where | None, *, leave: rig.Leave) -> Iterator[Robot]:
     where = where or Where()
-    return rig.connect(where.url, config=where.load(), seed=where.seed, leave=leave)
+    with (
+        interrupts.caught(),
+        rig.connect(
+            where.url,
+            config=where.load(),
+            seed=where.seed,
+            leave=leave,
+            pollables=[interrupts],
+        ) as robot,
+    ):
+        yield robot
 
 
 def _mm(values: object) -> str:
