@@ -59,9 +59,8 @@ def inverse(position_mm: npt.ArrayLike) -> Arc:
     # Half of equation 5's angle, without its loss of digits near 0.
     half_theta = np.arctan2(rho, z)
     theta = 2 * half_theta
-    with np.errstate(invalid="ignore", divide="ignore"):
-        # θ/ρ; on the axis its limit.
-        scale = np.where(rho > 0, theta / rho, 2 / z)
+    # θ/ρ. On the axis x = y = 0, and any factor gives Δ = 0.
+    scale = np.divide(theta, rho, out=np.zeros_like(theta), where=rho > 0)
     bend = np.stack([x * scale, y * scale], axis=-1)
     return Arc(length_mm=np.hypot(rho, z) / sinc(half_theta), bend_rad=bend)
 

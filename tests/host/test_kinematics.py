@@ -1,0 +1,204 @@
+"""Inverse, position, forward: round trips, shapes, dtypes and bad input."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from setae import kinematics, tendons
+from setae.arc import Arc
+from setae.config import TENDON_MODELS, Geometry
+from setae.errors import InputError, SetaeError
+
+GEOMETRY = Geometry()
+
+lengths = st.floats(20, 70)
+alphas = st.floats(-math.pi, math.pi) | st.sampled_from([0.0, math.pi / 2, math.pi, -math.pi / 2])
+thetas = (
+    st.floats(0, math.pi / 2)
+    | st.floats(-12, -3).map(lambda exponent: 10**exponent)
+    | st.sampled_from([0.0, math.pi / 2])
+)
+
+
+@given(lengths, thetas, alphas)
+def test_position_and_inverse_are_each_others_inverse(
+    length: float, theta: float, alpha: float
+) -> None:
+    arc = Arc.from_angles(length_mm=length, theta_rad=theta, alpha_rad=alpha)
+    back = kinematics.inverse(kinematics.position(arc))
+    assert float(np.abs(back.length_mm - arc.length_mm)) < 1e-9
+    assert float(np.abs(back.bend_rad - arc.bend_rad).max()) < 1e-11
+    assert np.abs(kinematics.position(back) - kinematics.position(arc)).max() < 1e-9
+
+
+@pytest.mark.parametrize("model", TENDON_MODELS)
+@given(length=lengths, theta=thetas, alpha=alphas)
+def test_forward_finds_the_arc_that_made_the_lengths(
+    model: str, length: float, theta: float, alpha: float
+) -> None:
+    arc = Arc.from_angles(length_mm=length, theta_rad=theta, alpha_rad=alpha)
+    back = kinematics.forward(tendons.lengths(arc, GEOMETRY, model), GEOMETRY, model)
+    assert np.abs(kinematics.position(back) - kinematics.position(arc)).max() < 1e-9
+
+
+@pytest.mark.parametrize("count", [3, 5, 6])
+def test_forward_of_the_paper_rule_with_other_numbers_of_tendons(count: int) -> None:
+    geometry = Geometry(tendon_angles_rad=tuple(2 * math.pi * i / count for i in range(count)))
+    random = np.random.default_rng(1)
+    arc = Arc.from_angles(
+        length_mm=random.uniform(20, 70, 200),
+        theta_rad=random.uniform(0, math.pi / 2, 200),
+        alpha_rad=random.uniform(-math.pi, math.pi, 200),
+    )
+    q = tendons.lengths(arc, geometry, "paper")
+    back = kinematics.forward(q, geometry, "paper", near=arc)
+    np.testing.assert_allclose(tendons.lengths(back, geometry, "paper"), q, atol=1e-9)
+
+
+def test_near_straight_the_angle_does_not_collapse() -> None:
+    # The paper's arccos gives θ = 0 here; the offset of the tip still shows it.
+    for x in (1e-3, 1e-7, 1e-12):
+        arc = kinematics.inverse((x, 0, 60))
+        assert float(arc.theta_rad) == pytest.approx(2 * x / 60, rel=1e-9)
+        assert float(arc.length_mm) == pytest.approx(60, abs=1e-6)
+
+
+def test_single_precision_keeps_its_digits_near_straight() -> None:
+    position = np.array([0.01, 0, 60], dtype=np.float32)
+    arc = kinematics.inverse(position)
+    assert float(arc.theta_rad) == pytest.approx(2 * 0.01 / 60, rel=1e-6)
+    assert arc.length_mm.dtype == np.float64
+
+
+def test_integers_are_numbers() -> None:
+    np.testing.assert_array_equal(
+        kinematics.position(kinematics.inverse([0, 0, 60])), [0.0, 0.0, 60.0]
+    )
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (7,), (2, 7), (0,)])
+def test_any_leading_shape(shape: tuple[int, ...]) -> None:
+    one = np.array([12.0, -5.0, 55.0])
+    arc = kinematics.inverse(np.broadcast_to(one, (*shape, 3)))
+    assert arc.length_mm.shape == shape
+    assert arc.bend_rad.shape == (*shape, 2)
+    assert kinematics.position(arc, tip_offset_mm=65.0).shape == (*shape, 3)
+    assert kinematics.transform(arc).shape == (*shape, 4, 4)
+    for model in TENDON_MODELS:
+        q = tendons.lengths(arc, GEOMETRY, model)
+        assert q.shape == (*shape, 4)
+        back = kinematics.forward(q, GEOMETRY, model)
+        assert back.length_mm.shape == shape
+        np.testing.assert_allclose(
+            kinematics.position(back), np.broadcast_to(one, (*shape, 3)), atol=1e-9
+        )
+
+
+def test_transform_is_a_rotation_everywhere() -> None:
+    arc = Arc.from_angles(
+        length_mm=50, theta_rad=np.linspace(0, math.pi, 50), alpha_rad=np.linspace(-3, 3, 50)
+    )
+    R = kinematics.transform(arc)[..., :3, :3]
+    np.testing.assert_allclose(
+        R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-14
+    )
+    np.testing.assert_allclose(np.linalg.det(R), 1.0, atol=1e-14)
+
+
+def test_least_squares_spreads_the_error_of_lengths_that_belong_to_no_arc() -> None:
+    q = np.array([60.0, 60.0, 60.0, 60.4])
+    arc = kinematics.forward(q, GEOMETRY)
+    assert float(arc.length_mm) == pytest.approx(60.1)
+    np.testing.assert_allclose(
+        np.abs(tendons.lengths(arc, GEOMETRY, "parallel") - q), 0.1, atol=1e-9
+    )
+
+
+def test_paper_fit_survives_rounding_to_ticks_when_it_knows_where_to_look() -> None:
+    # Found by search: arcs 21 mm apart whose lengths agree to less than 0.1 mm.
+    arc = Arc.from_angles(
+        length_mm=68.8074467518179, theta_rad=1.2414373615598033, alpha_rad=math.radians(9.59219)
+    )
+    q = tendons.lengths(arc, GEOMETRY, "paper") + [-0.007, 0.05, 0.002, 0.019]
+    lost = kinematics.forward(q, GEOMETRY, "paper")
+    assert np.linalg.norm(lost.top_mm - arc.top_mm) > 15
+    assert np.abs(tendons.lengths(lost, GEOMETRY, "paper") - q).max() < 0.1
+    found = kinematics.forward(q, GEOMETRY, "paper", near=arc)
+    assert np.linalg.norm(found.top_mm - arc.top_mm) < 0.3
+
+
+def test_one_hint_serves_many_lengths() -> None:
+    positions = np.array([(15.0, 3.0, 60.0), (14.0, 4.0, 60.0)])
+    q = tendons.lengths(kinematics.inverse(positions), GEOMETRY, "paper")
+    back = kinematics.forward(q, GEOMETRY, "paper", near=kinematics.inverse(positions[0]))
+    np.testing.assert_allclose(back.top_mm, positions, atol=1e-9)
+
+
+BAD_POSITIONS: list[tuple[Any, str]] = [
+    ((math.nan, 0, 60), r"position_mm\[0\] is nan"),
+    ([(0, 0, 60), (0, math.inf, 60)], r"position_mm\[1, 1\] is inf"),
+    ((0, 0), r"position_mm has shape \(2,\).*x, y, z"),
+    (60.0, r"position_mm has shape \(\)"),
+    ((0, 0, 0), "z = 0 mm"),
+    ([(0, 0, 60), (0, 0, -3)], r"position_mm\[1\] has z = -3 mm"),
+    ("straight up", "not an array of real numbers"),
+    ([(0, 0, 60), (1, 2)], "not an array of real numbers"),
+    ((1j, 0, 60), "not an array of real numbers"),
+    (None, "not an array of real numbers"),
+]
+
+
+@pytest.mark.parametrize(("position", "message"), BAD_POSITIONS)
+def test_bad_positions_say_what_is_wrong(position: npt.ArrayLike, message: str) -> None:
+    with pytest.raises(InputError, match=message) as raised:
+        kinematics.inverse(position)
+    assert isinstance(raised.value, SetaeError)
+    assert isinstance(raised.value, ValueError)
+
+
+def test_bad_arcs_say_what_is_wrong() -> None:
+    with pytest.raises(InputError, match="length_mm is 0"):
+        Arc(length_mm=0, bend_rad=(0, 0))
+    with pytest.raises(InputError, match=r"bend_rad\[1\] is nan"):
+        Arc(length_mm=60, bend_rad=(0, math.nan))
+    with pytest.raises(InputError, match=r"bend_rad has shape \(3,\)"):
+        Arc(length_mm=60, bend_rad=(0, 0, 0))
+    with pytest.raises(InputError, match=r"length_mm has shape \(3,\) and bend_rad \(2, 2\)"):
+        Arc(length_mm=[60, 60, 60], bend_rad=[(0, 0), (0, 0)])
+
+
+def test_bad_lengths_say_what_is_wrong() -> None:
+    with pytest.raises(InputError, match=r"lengths_mm has shape \(3,\).*4 entries"):
+        kinematics.forward([60, 60, 60], GEOMETRY)
+    with pytest.raises(InputError, match=r"lengths_mm\[2\] is -1"):
+        kinematics.forward([60, 60, -1, 60], GEOMETRY)
+    with pytest.raises(InputError, match="three different angles"):
+        kinematics.forward([60, 60], Geometry(tendon_angles_rad=(0, math.pi)))
+    with pytest.raises(InputError, match="There are: paper, parallel"):
+        kinematics.forward([60, 60, 60, 60], GEOMETRY, "taut")
+    with pytest.raises(InputError, match=r"near has shape \(2,\)"):
+        kinematics.forward(
+            [60, 60, 60, 60], GEOMETRY, "paper", near=Arc(length_mm=[60, 60], bend_rad=(0, 0))
+        )
+
+
+def test_an_arc_cannot_be_changed_behind_its_back() -> None:
+    bend = np.zeros(2)
+    arc = Arc(length_mm=60, bend_rad=bend)
+    bend[0] = 1
+    assert float(arc.theta_rad) == 0
+    with pytest.raises(ValueError, match="read-only"):
+        arc.bend_rad[0] = 1
+
+
+def test_an_arc_can_be_indexed_like_its_poses() -> None:
+    arc = Arc(length_mm=[[40, 50], [60, 70]], bend_rad=(0.1, 0.2))
+    assert arc[1].length_mm.tolist() == [60, 70]
+    assert float(arc[1, 0].length_mm) == 60
+    assert arc[..., 0].bend_rad.shape == (2, 2)
