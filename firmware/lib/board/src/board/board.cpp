@@ -138,7 +138,7 @@ void Board::watch_hold_timeout() {
 
 void Board::put_out() {
   if (attached_ == kAllServos && current_attached_ == kAllServos) {
-    limits_.constrain(current_, next_);
+    limits_.confine(current_, next_);
   }
   hal_.set_pulses(next_, attached_);
 }

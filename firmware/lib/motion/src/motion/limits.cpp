@@ -85,7 +85,7 @@ Verdict Limits::check_slew(uint16_t slew_ticks) const {
   return Verdict::accept();
 }
 
-void Limits::constrain(const Pulses& previous, Pulses& pulses) const {
+void Limits::confine(const Pulses& previous, Pulses& pulses) const {
   for (uint8_t i = 0; i < protocol::kServos; ++i) {
     int32_t ticks = pulses.ticks[i];
     if (ticks < limits_.pulse_min_ticks[i])

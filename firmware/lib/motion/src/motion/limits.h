@@ -30,7 +30,7 @@ class Limits {
 
   // The last guard before the servos: never outside a servo's range, never faster than the slew
   // limit, whatever was planned.
-  void constrain(const Pulses& previous, Pulses& pulses) const;
+  void confine(const Pulses& previous, Pulses& pulses) const;
 
   uint32_t coarse_threshold_raw() const { return limits_.coarse_threshold_raw; }
   // 0: never.

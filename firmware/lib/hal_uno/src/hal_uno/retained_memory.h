@@ -1,0 +1,21 @@
+// What survives a reset, and why the board started.
+#pragma once
+
+#include "hal/hal.h"
+
+namespace setae {
+namespace retained_memory {
+
+// Checks what the last run left.
+void begin();
+protocol::ResetCause reset_cause();
+Retained& content();
+// Makes the content valid for the next start.
+void seal();
+// For the watchdog's handler.
+void mark_stall_from_interrupt();
+void clear_stall();
+bool stall_marked();
+
+}  // namespace retained_memory
+}  // namespace setae

@@ -1,0 +1,26 @@
+// Four servo pulses whose edges the timers' compare units set by themselves: no interrupt, late
+// or not, moves an edge. Servos 0 to 3 are on D9, D10, D11, D3.
+//
+// The frame's start is also the board's clock.
+#pragma once
+
+#include <stdint.h>
+
+#include "hal/hal.h"
+
+namespace setae {
+namespace servo_pulses {
+
+void begin();
+
+// For the next frame and those after it, all four at once.
+void set(const Pulses& pulses, uint8_t attached);
+// Lets the pulses end with this frame. For interrupt handlers.
+void detach_from_interrupt();
+
+BoardTime now();
+// 0.5 us each; wraps after 32 ms.
+uint16_t ticks();
+
+}  // namespace servo_pulses
+}  // namespace setae

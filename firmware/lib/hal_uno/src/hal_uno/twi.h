@@ -1,0 +1,50 @@
+// One I2C register transfer at a time, advanced by polling: no call waits, and a transfer that
+// takes too long is given up. (The Arduino Wire library waits for ever on a stuck bus.)
+#pragma once
+
+#include <stdint.h>
+
+namespace setae {
+
+class Twi {
+ public:
+  static constexpr uint8_t kReadMax = 3;
+
+  enum class Result : uint8_t {
+    kIdle,
+    kBusy,
+    kDone,    // once for each transfer, as are the next two
+    kNoAck,   // nobody answers at the address
+    kFailed,  // the bus is stuck or disturbed
+  };
+
+  void begin();
+
+  // Only after a result other than kBusy.
+  void start_write(uint8_t address, uint8_t reg, uint8_t value);
+  void start_read(uint8_t address, uint8_t reg, uint8_t size);
+
+  Result poll();
+  const uint8_t* data() const { return data_; }
+
+  // Frees a bus that a slave holds, cut off in the middle of a byte. Takes 0.1 ms.
+  void recover();
+
+ private:
+  void start(uint8_t address, uint8_t reg, uint8_t size, bool reading);
+  Result finish(Result result);
+  Result advance(uint8_t status);
+
+  uint8_t address_ = 0;
+  uint8_t reg_ = 0;
+  uint8_t size_ = 0;
+  uint8_t moved_ = 0;  // bytes
+  bool reading_ = false;
+  bool running_ = false;
+  bool begun_ = false;  // the START is on its way
+  bool reg_sent_ = false;
+  uint16_t begun_ticks_ = 0;
+  uint8_t data_[kReadMax] = {};
+};
+
+}  // namespace setae

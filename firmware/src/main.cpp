@@ -1,0 +1,26 @@
+// The UNO: wiring and loop, nothing else.
+//
+//   D9, D10, D11, D3   servos of tendons 0 to 3
+//   A4 (SDA), A5 (SCL) pressure sensor, through a level shifter
+//   D0, D1 (USB)       the host
+#include <Arduino.h>
+
+#include "board/board.h"
+#include "hal_uno/uno_hal.h"
+
+namespace {
+
+setae::UnoHal hal;
+setae::Board board(hal);
+
+}  // namespace
+
+// Called by the Arduino core.
+void setup() {
+  hal.begin();
+}
+
+void loop() {
+  board.poll();
+  hal.service();
+}
