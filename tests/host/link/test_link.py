@@ -277,6 +277,7 @@ class ModelTransport:
         self.number = itertools.count()
         self.board = ModelBoard(self.post)
         self.cut_off = False
+        self.deaf = False
         self.sent: list[bytes] = []
         self.at(20_000, self.tick)
 
@@ -298,7 +299,7 @@ class ModelTransport:
         self.sent.append(data)
 
         def arrive() -> bytes:
-            if not self.cut_off:
+            if not self.cut_off and not self.deaf:
                 self.board.receive(data)
             return b""
 
@@ -560,7 +561,7 @@ def test_pulled_cable_is_link_lost(line: ModelTransport, session: Session) -> No
 def test_dead_downlink_is_link_lost_though_telemetry_comes(
     line: ModelTransport, session: Session
 ) -> None:
-    line.board.decoder.feed = lambda _: []  # type: ignore[method-assign]  # a fault to inject
+    line.deaf = True
     with pytest.raises(LinkLostError, match="enable"):
         session.request(Enable(pulse_ticks=POSE), timeout_us=60 * SECOND_US)
     assert line.now_us() < 15 * SECOND_US
@@ -644,11 +645,12 @@ def test_nothing_runs_twice_or_out_of_order(
         return [ticket.message for ticket in tickets if ticket.state is state]
 
     # Segments that a stop dropped from the board's queue count as discarded.
-    dropped = messages(TicketState.DISCARDED)
+    discarded = messages(TicketState.DISCARDED)
+    dropped = [message for message in discarded if isinstance(message, Segments)]
     ran = [message for message in board.executed if message != "stop"]
     assert [message for message in ran if message not in dropped] == messages(TicketState.EXECUTED)
     assert is_part(ran, [ticket.message for ticket in tickets])
-    assert is_part(board.discarded, dropped), "some never left the host"
+    assert is_part(board.discarded, discarded), "some never left the host"
     assert board.refused == messages(TicketState.REFUSED)
     assert not messages(TicketState.FAILED)
     assert session.state is board.state

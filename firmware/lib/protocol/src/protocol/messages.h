@@ -1023,7 +1023,7 @@ struct Limits : SetLimits {
   static constexpr MessageType kType = MessageType::kLimits;
 
   Limits() = default;
-  explicit Limits(const SetLimits& other) : SetLimits(other) {}
+  explicit Limits(const SetLimits& all) : SetLimits(all) {}
 };
 
 // Payload bytes of a message from the host; 0xFF for a type that is none of them.

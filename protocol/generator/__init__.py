@@ -1,0 +1,1 @@
+"""Turns the schema into files: one module for each kind of file."""
