@@ -11,9 +11,10 @@ struct Mode {
   int order;
 };
 
-constexpr Mode kModeTable[kModes] = {{kBendX, 0},  {kBendX, 1},  {kBendX, 2}, {kBendY, 0},
-                                     {kBendY, 1},  {kBendY, 2},  {kTwist, 0}, {kShearX, 0},
-                                     {kShearY, 0}, {kAxial, 0},  {kAxial, 1}};
+constexpr Mode kModeTable[kModes] = {{kBendX, 0},  {kBendX, 1},  {kBendX, 2},  {kBendY, 0},
+                                     {kBendY, 1},  {kBendY, 2},  {kTwist, 0},  {kShearX, 0},
+                                     {kShearX, 1}, {kShearY, 0}, {kShearY, 1}, {kAxial, 0},
+                                     {kAxial, 1}};
 
 double legendre(int order, double u) {  // on 0..1
   const double x = 2 * u - 1;
