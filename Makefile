@@ -98,6 +98,10 @@ lint: .venv/.dev ## style, types and the direction of imports
 	PYTHONPATH=host:protocol $(BIN)/lint-imports --no-cache
 	@echo clang-format --dry-run -Werror
 	@$(BIN)/clang-format --dry-run -Werror $(CPP_SOURCES)
+	@echo 'setae: compiling the simulator with warnings as errors'
+	@$(BIN)/cmake -S . -B build/strict -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja \
+	  -DSETAE_WERROR=ON >/dev/null
+	@$(BIN)/cmake --build build/strict >build/strict/log || { cat build/strict/log; exit 1; }
 
 .PHONY: drift
 drift: .venv/.dev ## are the generated files those that the schema gives?
@@ -110,6 +114,7 @@ firmware-test: ## the firmware's unit tests, on this machine
 .PHONY: firmware
 firmware: ## build the firmware for the UNO, and check its size
 	$(PIO) run -e uno
+	@$(PYTHON) firmware/check_size.py .pio/build/uno/firmware.elf
 
 .PHONY: wheel
 wheel: .venv/.dev ## build sdist and wheel, and run what they install outside the tree
