@@ -32,6 +32,7 @@ from setae.errors import (
     StoppedError,
     TrajectoryError,
     TrippedError,
+    UnreachableError,
 )
 from setae.link.events import (
     Event,
@@ -370,10 +371,11 @@ class Robot:
         duration_s: float | None = None,
         speed_mm_s: float | None = None,
     ) -> None:
-        """Like `move_to`, for tendon lengths, (4,)."""
+        """Like `move_to`, for tendon lengths, (4,), in a straight line between them."""
         lengths = finite_array("lengths_mm", lengths_mm, last_axis=4, what="one a tendon")
         if lengths.shape != (4,):
             raise InputError(f"lengths_mm has shape {lengths.shape}.", "Give four lengths.")
+        self._require_allowed(self._ticks_for(lengths))
         self._told("move_lengths", lengths_mm=_list(lengths), duration_s=duration_s,
                    speed_mm_s=speed_mm_s)  # fmt: skip
         self._move(lengths, duration_s, speed_mm_s)
@@ -613,6 +615,20 @@ class Robot:
             raise InputError(f"position_mm has shape {position.shape}.", "Give one x, y, z.")
         arc = kinematics.inverse(position)
         return workspace.require(arc, self.config, model)
+
+    def _require_allowed(self, ticks: Ticks) -> None:
+        """Refuse here what the board would refuse: sums and differences of opposite tendons."""
+        limits = _board_limits(self.config)
+        for pair, (a, b) in enumerate(((0, 2), (1, 3))):
+            total, difference = ticks[a] + ticks[b], ticks[a] - ticks[b]
+            low, high = limits.pair_sum_min_ticks[pair], limits.pair_sum_max_ticks[pair]
+            least = limits.pair_difference_min_ticks[pair]
+            most = limits.pair_difference_max_ticks[pair]
+            if not (low <= total <= high and least <= difference <= most):
+                raise UnreachableError(
+                    f"Tendons {a} and {b} at these lengths would crush or over-bend the spring.",
+                    "Choose lengths that belong to a pose inside the workspace.",
+                )
 
     def _move(
         self,

@@ -1,0 +1,106 @@
+"""Robots for tests: the simulated one, with hands on its line and its world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from setae.config import load
+from setae.link.events import Event, TelemetryReceived
+from setae.link.lossy import Faults, LossyTransport
+from setae.link.session import Session
+from setae.robot import Robot
+from setae.scene import Obstacle, tube_scene
+from setae.sim import SimTransport, SimulatedStage, World
+
+# Deep enough, in every direction that matters here, for a probe to find it.
+WALL_AHEAD = Obstacle(below_tip_mm=1.0)
+
+
+@dataclass
+class Bench:
+    """A robot and all that a test may look at or meddle with."""
+
+    robot: Robot
+    stage: SimulatedStage
+    line: LossyTransport
+    world: World
+    reports: list[TelemetryReceived] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    _hooks: list[Callable[[int], None]] = field(default_factory=list)
+
+    def poll(self, now_us: int) -> None:
+        for hook in tuple(self._hooks):
+            hook(now_us)
+
+    def at(self, time_us: int, act: Callable[[], object]) -> None:
+        """Do something once, at a time, from within the session's loop."""
+
+        def hook(now_us: int) -> None:
+            if now_us >= time_us:
+                self._hooks.remove(hook)
+                act()
+
+        self._hooks.append(hook)
+
+    def pulses_us(self) -> npt.NDArray[np.float64]:
+        """What the board puts out now."""
+        return self.world.truth().pulse_us
+
+    def run(self, duration_s: float) -> None:
+        self.robot.session.run_for(round(duration_s * 1e6))
+
+
+@contextmanager
+def bench(
+    *,
+    seed: int = 1,
+    obstacle: Obstacle | None = None,
+    down: Faults | None = None,
+    up: Faults | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Iterator[Bench]:
+    """A connected robot, relaxed, in a world of its own."""
+    config = load()
+    scene = tube_scene(config, obstacle)
+    with World(seed=seed, parameters={**dict(config.simulator), **(parameters or {})}) as world:
+        world.add_tube(scene.tube_axis_mm, scene.tube_inner_radius_mm)
+        if scene.box is not None:
+            world.add_box(scene.box.centre_mm, scene.box.edges_mm, scene.box.yaw_rad)
+        world.start()
+        line = LossyTransport(
+            SimTransport(world), seed=seed, down=down or Faults(), up=up or Faults()
+        )
+        session = Session(line, session_id=7)
+        robot = Robot(session, config)
+        made = Bench(robot, SimulatedStage(world, config.stage), line, world)
+        session.pollables.append(made)
+
+        def note(event: Event) -> None:
+            made.events.append(event)
+            if isinstance(event, TelemetryReceived):
+                made.reports.append(event)
+
+        session.subscribe(note)
+        session.open()
+        robot.prepare()
+        yield made
+
+
+@contextmanager
+def compressed(
+    *,
+    seed: int = 1,
+    obstacle: Obstacle | None = None,
+    down: Faults | None = None,
+    up: Faults | None = None,
+) -> Iterator[Bench]:
+    """The same, enabled and compressed to 45 mm."""
+    with bench(seed=seed, obstacle=obstacle, down=down, up=up) as made:
+        made.robot.enable()
+        made.robot.compress(45.0)
+        yield made
