@@ -53,8 +53,8 @@ Arm::Motion Arm::at(int64_t now_us) const {
     motion.along_mm +=
         spent_s * (motion.speed_mm_s + 0.5 * phase.acceleration_mm_s2 * spent_s);
     motion.speed_mm_s += phase.acceleration_mm_s2 * spent_s;
+    if (left_s < phase.duration_s) return motion;
     left_s -= spent_s;
-    if (left_s <= 0) return motion;
   }
   return {distance_mm_, 0, true};
 }

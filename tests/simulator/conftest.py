@@ -100,9 +100,7 @@ class Driver:
             a, b, c, d, e = part + [_EMPTY] * (5 - len(part))
             tickets.append(
                 self.session.send(
-                    Segments(
-                        epoch=self.session.epoch, count=len(part), segments=(a, b, c, d, e)
-                    )
+                    Segments(epoch=self.session.epoch, count=len(part), segments=(a, b, c, d, e))
                 )
             )
         self.session.run_until(
@@ -115,7 +113,9 @@ class Driver:
             len(segments) * frames_each * 20_000 + 2_000_000,
         )
 
-    def pull(self, lengths_mm: npt.ArrayLike, duration_s: float = 0.5, rest_s: float = 0.3) -> Truth:
+    def pull(
+        self, lengths_mm: npt.ArrayLike, duration_s: float = 0.5, rest_s: float = 0.3
+    ) -> Truth:
         """Move smoothly to tendon lengths, let the robot come to rest, and look."""
         start = self.lengths_mm
         self.lengths_mm = np.broadcast_to(np.asarray(lengths_mm, dtype=float), (4,)).copy()
@@ -124,6 +124,10 @@ class Driver:
         self.play([ticks(start + f * (self.lengths_mm - start)) for f in blend])
         self.wait(rest_s)
         return self.world.truth()
+
+    def reach(self, position_mm: Sequence[float], duration_s: float = 0.5) -> Truth:
+        """Like `pull`, to the lengths that the constant-curvature arc to a position has."""
+        return self.pull(arc_lengths_mm(position_mm), duration_s)
 
     def wait(self, duration_s: float) -> None:
         """Let time pass, with the link alive."""
