@@ -7,6 +7,7 @@ order of painting are done here.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,13 @@ HOLDER_HEIGHT_MM = 70.0
 class View:
     """Direction from which the scene is seen; angles of the eye, in degrees."""
 
-    azimuth_deg: float = 236.0
-    elevation_deg: float = 17.0
+    azimuth_deg: float = shapes.EYE_DEG
+    elevation_deg: float = 20.0
+
+    @classmethod
+    def into(cls, tube: Tube | None) -> View:
+        """Look into the tube from its open side."""
+        return cls(azimuth_deg=shapes.EYE_DEG + np.degrees(shapes.towards_wall_rad(tube)))
 
     def axes(self) -> tuple[Floats, Floats, Floats]:
         """Unit vectors to the right, up, and towards the eye, (3,) each."""
@@ -50,29 +56,30 @@ class View:
         return np.asarray(points_mm @ self.axes()[2])
 
 
-def tube(
-    axes: Any, view: View, tube: Tube, bottom_mm: float, top_mm: float, half_deg: float
-) -> None:
+def tube(axes: Any, view: View, tube: Tube, bottom_mm: float, top_mm: float) -> None:
     """Draw the part of the tube's wall around the robot, with a ring every 20 mm."""
     collections = extras.load("matplotlib.collections")
-    wall = shapes.shell(tube, bottom_mm, top_mm, half_deg=half_deg)
+    wall = shapes.shell(tube, bottom_mm, top_mm)
     flat = view.flat(wall)
     quads = np.stack([flat[0, :-1], flat[0, 1:], flat[1, 1:], flat[1, :-1]], axis=1)
     middle = (wall[0, :-1] + wall[0, 1:]) / 2
     inward = np.array([*tube.axis_mm, 0.0]) - middle
     inward[:, 2] = 0.0
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    light = np.clip(inward @ np.array([-0.85, 0.45, 0.3]), 0.0, 1.0)
+    right, _, eye = view.axes()
+    light = np.clip(inward @ (0.8 * eye + 0.6 * right), 0.0, 1.0)
     faces = [palette.mix(palette.TUBE, "#ffffff", 0.52 + 0.42 * share) for share in light]
     axes.add_collection(
-        collections.PolyCollection(quads, facecolors=faces, edgecolors=faces, linewidths=0.4)
+        collections.PolyCollection(
+            quads, facecolors=faces, edgecolors=faces, linewidths=0.4, zorder=1
+        )
     )
     for height in np.arange(np.ceil(bottom_mm / 20) * 20, top_mm, 20):
-        line = view.flat(shapes.shell(tube, height, height, half_deg=half_deg)[0])
-        axes.plot(*line.T, color="white", linewidth=0.8, alpha=0.75)
+        line = view.flat(shapes.shell(tube, height, height)[0])
+        axes.plot(*line.T, color="white", linewidth=0.9, alpha=0.8, zorder=1)
     edge = palette.mix(palette.TUBE, palette.INK, 0.25)
     for line in (flat[0], flat[1], flat[:, 0], flat[:, -1]):
-        axes.plot(*line.T, color=edge, linewidth=1.2, solid_capstyle="round")
+        axes.plot(*line.T, color=edge, linewidth=1.2, solid_capstyle="round", zorder=1)
 
 
 def cube(axes: Any, view: View, cube: Cube) -> None:
@@ -88,7 +95,8 @@ def cube(axes: Any, view: View, cube: Cube) -> None:
         if view.depth(normal) <= 0:
             continue
         faces.append(view.flat(points))
-        share = 0.5 + 0.5 * float(normal @ np.array([-0.35, -0.25, 0.9]))
+        right, up, eye = view.axes()
+        share = 0.5 + 0.5 * float(normal @ (0.75 * up + 0.5 * eye - 0.43 * right))
         colours.append(palette.mix(palette.mix(palette.CUBE, palette.INK, 0.25), "#fff3de", share))
     axes.add_collection(
         collections.PolyCollection(
@@ -97,6 +105,7 @@ def cube(axes: Any, view: View, cube: Cube) -> None:
             edgecolors=palette.mix(palette.CUBE, palette.INK, 0.45),
             linewidths=1.0,
             joinstyle="round",
+            zorder=2,
         )
     )
 
@@ -111,14 +120,14 @@ def holder(axes: Any, view: View, arm_mm: Floats) -> None:
         (HOLDER_HEIGHT_MM, HOLDER_HEIGHT_MM + 26.0, 0.62 * HOLDER_RADIUS_MM, "#dfe4e9"),
     )
     for bottom, top, radius, colour in levels:
-        low = view.flat(shapes.ring(arm_mm + [0, 0, bottom], first, second, radius))
-        high = view.flat(shapes.ring(arm_mm + [0, 0, top], first, second, radius))
-        sides = np.linspace(-1.0, 1.0, 41)
+        up = np.array([0.0, 0.0, 1.0])
+        low = view.flat(shapes.ring(arm_mm + bottom * up, first, second, radius))
+        high = view.flat(shapes.ring(arm_mm + top * up, first, second, radius))
         left, right = low[:, 0].min(), low[:, 0].max()
         # Vertical strips, shaded like a cylinder that is lit from the left.
-        for start, end in zip(sides[:-1], sides[1:], strict=True):
+        for start, end in pairwise(np.linspace(-1.0, 1.0, 41)):
             middle = (start + end) / 2
-            light = 0.5 + 0.5 * np.cos(np.arcsin(middle) + 0.7)
+            light = 0.1 + 0.75 * np.cos(np.arcsin(middle) + 0.6) ** 2
             x = np.array([start, end]) * (right - left) / 2 + (right + left) / 2
             drop = np.ptp(low[:, 1]) / 2 * np.sqrt(np.clip(1 - np.array([start, end]) ** 2, 0, 1))
             bottom_y = low[:, 1].mean() - drop
@@ -130,19 +139,15 @@ def holder(axes: Any, view: View, arm_mm: Floats) -> None:
                     facecolor=colour_here,
                     edgecolor=colour_here,
                     linewidth=0.4,
+                    zorder=4,
                 )
             )
-        axes.add_patch(patches.Polygon(high, facecolor="#eef1f4", edgecolor=edge, linewidth=0.8))
+        axes.add_patch(patches.Polygon(high, fc="#eef1f4", ec=edge, lw=0.8, zorder=4))
         lower_half = low[low[:, 1] <= low[:, 1].mean() + 1e-9]
         lower_half = lower_half[np.argsort(lower_half[:, 0])]
-        axes.plot(*lower_half.T, color=edge, linewidth=0.8)
+        axes.plot(*lower_half.T, color=edge, linewidth=0.8, zorder=4)
         for x in (left, right):
-            axes.plot(
-                [x, x],
-                [low[:, 1].mean(), high[:, 1].mean()],
-                color=edge,
-                linewidth=0.8,
-            )
+            axes.plot([x, x], [low[:, 1].mean(), high[:, 1].mean()], c=edge, lw=0.8, zorder=4)
 
 
 def robot(
@@ -179,6 +184,7 @@ def robot(
             colors=[colours[i] for i in order],
             linewidths=[widths[i] for i in order],
             capstyle="round",
+            zorder=3,
         )
     )
 
@@ -198,19 +204,22 @@ def robot(
             color=palette.SILICONE,
             linewidth=7.0 * scale,
             solid_capstyle="round",
+            zorder=3,
         )
         axes.add_patch(
-            patches.Polygon(
-                pad, facecolor=palette.SILICONE, edgecolor=silicone_edge, linewidth=0.5 * scale
-            )
+            patches.Polygon(pad, fc=palette.SILICONE, ec=silicone_edge, lw=0.5 * scale, zorder=3)
         )
-        axes.plot(*bristle.T, color=palette.BRISTLE, linewidth=2.6 * scale, solid_capstyle="round")
+        axes.plot(
+            *bristle.T,
+            color=palette.BRISTLE,
+            linewidth=2.6 * scale,
+            solid_capstyle="round",
+            zorder=3,
+        )
 
     if not looking_at_us:
         draw_bristle()
-    axes.add_patch(
-        patches.Polygon(cap, facecolor="#e4e9ee", edgecolor=edge, linewidth=0.9 * scale)
-    )
+    axes.add_patch(patches.Polygon(cap, fc="#e4e9ee", ec=edge, lw=0.9 * scale, zorder=3))
     if looking_at_us:
         draw_bristle()
 

@@ -90,6 +90,7 @@ def write(
 
 
 def _logs(logs: str | Path | Iterable[str | Path | Log]) -> Sequence[str | Path | Log]:
+    found: Sequence[str | Path | Log]
     if not isinstance(logs, str | Path):
         found = list(logs)
     elif Path(logs).is_dir():

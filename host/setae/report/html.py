@@ -72,7 +72,9 @@ def finding(rows: Sequence[Comparison]) -> str:
     sentences = []
     if with_obstacle:
         found = sum(row.trial.touched for row in with_obstacle)
-        sentences.append(f"The bristle found the obstacle in {found} of {len(with_obstacle)} trials")
+        sentences.append(
+            f"the bristle found the obstacle in {found} of {len(with_obstacle)} trials"
+        )
     if without:
         false = sum(row.trial.touched for row in without)
         touched = "touched nothing" if not false else f"reported a touch in {false}"
@@ -91,8 +93,8 @@ def finding(rows: Sequence[Comparison]) -> str:
 
 def _badges(trials: Sequence[Trial]) -> str:
     if trials[0].simulated:
-        text = origin_note(trials)
-        badges = f'<span class="badge">{html.escape(text[:1].upper() + text[1:])}: no hardware</span>'
+        text = html.escape(origin_note(trials).capitalize())
+        badges = f'<span class="badge">{text}: no hardware</span>'
     else:
         badges = '<span class="badge real">Measured on the robot</span>'
     if any(not trial.complete or trial.log.damage for trial in trials):
@@ -102,13 +104,15 @@ def _badges(trials: Sequence[Trial]) -> str:
 
 def _table(rows: Sequence[Comparison]) -> str:
     lines = [
-        "<table><thead><tr><th></th><th></th>"
-        '<th class="group" colspan="4">this run</th>'
-        '<th class="group paper" colspan="2">paper</th><th></th></tr>'
-        "<tr><th>trial</th><th>obstacle below (mm)</th><th>stopped at (mm)</th><th>touched</th>"
-        "<th>touches</th><th>directions felt</th>"
-        '<th class="paper">stopped at (mm)</th><th class="paper">touched</th><th></th></tr>'
-        "</thead><tbody>"
+        (
+            "<table><thead><tr><th></th><th></th>"
+            '<th class="group" colspan="4">this run</th>'
+            '<th class="group paper" colspan="2">paper</th><th></th></tr>'
+            "<tr><th>trial</th><th>obstacle below (mm)</th><th>stopped at (mm)</th><th>touched</th>"
+            "<th>touches</th><th>directions felt</th>"
+            '<th class="paper">stopped at (mm)</th><th class="paper">touched</th><th></th></tr>'
+            "</thead><tbody>"
+        )
     ]
     for index, row in enumerate(rows):
         trial, theirs = row.trial, row.theirs
@@ -138,6 +142,12 @@ def _table(rows: Sequence[Comparison]) -> str:
     return "".join(lines)
 
 
+_SIMULATED = (
+    "simulated: the board’s own firmware, compiled for this computer, drives a physical model of "
+    "servos, tendons, spring and bristle. No hardware was involved."
+)
+
+
 def _origin(trials: Sequence[Trial]) -> str:
     metadata = trials[0].log.metadata
     rows: list[tuple[str, str]] = []
@@ -145,8 +155,7 @@ def _origin(trials: Sequence[Trial]) -> str:
         rows.append(
             (
                 "robot",
-                "simulated: the board’s own firmware, compiled for this computer, drives a "
-                "physical model of servos, tendons, spring and bristle. No hardware was involved.",
+                _SIMULATED,
             )
         )
     else:
@@ -182,14 +191,13 @@ def _config_text(trial: Trial) -> str:
 
 def _data(trials: Sequence[Trial]) -> dict[str, Any]:
     floor = floor_mm(trials)
-    tube = next((trial.tube for trial in trials if trial.tube), None)
-    towards = math.atan2(-tube.axis_mm[1], -tube.axis_mm[0]) if tube else 0.0
+    towards = shapes.towards_wall_rad(next((trial.tube for trial in trials if trial.tube), None))
     return {
         "trials": [_trial(trial) for trial in trials],
         "floor_mm": floor,
         "bounds_mm": _bounds(trials, floor),
-        # From the open side, a little from the right.
-        "view_rad": towards + math.radians(225.0),
+        "view_rad": towards + math.radians(shapes.EYE_DEG),
+        "wall_deg": shapes.WALL_DEG,
         "robot": {
             "coils": shapes.SPRING_COILS,
             "spring_radius_mm": drawing.SPRING_RADIUS_MM,
@@ -220,10 +228,12 @@ def _bounds(trials: Sequence[Trial], floor: float) -> list[list[float]]:
         if trial.tube:
             points.append(shapes.shell(trial.tube, floor, 10.0).reshape(-1, 3))
         if trial.motion:
-            top = trial.motion.arm_mm + [0.0, 0.0, drawing.HOLDER_HEIGHT_MM + 30.0]
+            top = trial.motion.arm_mm + np.array([0.0, 0.0, drawing.HOLDER_HEIGHT_MM + 30.0])
             points.append(top)
     together = np.concatenate(points)
-    return [[float(low), float(high)] for low, high in zip(together.min(0), together.max(0), strict=True)]
+    ends = zip(together.min(axis=0), together.max(axis=0), strict=True)
+    # Plotly cuts off what lies outside, so leave room.
+    return [[float(low) - 6.0, float(high) + 6.0] for low, high in ends]
 
 
 def _trial(trial: Trial) -> dict[str, Any]:

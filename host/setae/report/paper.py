@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from importlib import resources
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +36,14 @@ def trials() -> tuple[PaperTrial, ...]:
     >>> [trial.descent_mm for trial in trials()]
     [40, 60, 80, 100, 100]
     """
-    return tuple(PaperTrial(**trial) for trial in _data()["trials"])
+    return tuple(
+        PaperTrial(
+            obstacle_below_tip_mm=trial["obstacle_below_tip_mm"],
+            descent_mm=trial["descent_mm"],
+            contact=trial["contact"],
+        )
+        for trial in _data()["trials"]
+    )
 
 
 def trial_like(obstacle_below_tip_mm: float | None) -> PaperTrial | None:
@@ -55,7 +63,7 @@ def source() -> str:
     return str(_data()["source"])
 
 
-def _data() -> dict[str, list[dict[str, float | bool | None]]]:
+def _data() -> dict[str, Any]:
     text = resources.files("setae.report").joinpath("paper.json").read_text(encoding="utf-8")
-    data: dict[str, list[dict[str, float | bool | None]]] = json.loads(text)
+    data: dict[str, Any] = json.loads(text)
     return data

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from setae.report import drawing, extras, palette
+from setae.report import drawing, extras, palette, shapes
 from setae.report.drawing import View
 from setae.report.tables import compare
 from setae.report.trial import Contact, Direction, Level, Trial
 
-VIEW = View()
-HALF_DEG = 62.0
 FLOOR_BELOW_MM = 30.0
-TOP_MM = 118.0
+RIM_MM = 10.0
+_ABOVE_MM = drawing.HOLDER_HEIGHT_MM + 30.0  # the arm above frame D
 
 _STYLE = {
     "font.family": "DejaVu Sans",
@@ -40,10 +40,7 @@ _STYLE = {
 
 def _figure(width_in: float, height_in: float) -> Any:
     """Make a figure that no window system knows of."""
-    backend = extras.load("matplotlib.backends.backend_agg")
-    figure = extras.load("matplotlib.figure").Figure(figsize=(width_in, height_in))
-    backend.FigureCanvasAgg(figure)
-    return figure
+    return extras.load("matplotlib.figure").Figure(figsize=(width_in, height_in))
 
 
 def _style() -> Any:
@@ -119,16 +116,15 @@ def draw_scene(
     """Draw one moment of a trial: tube, cube, arm, robot and the touches so far."""
     motion = trial.motion
     assert motion is not None
+    view = View.into(trial.tube)
     if trial.tube is not None:
-        drawing.tube(axes, VIEW, trial.tube, floor, 10.0, HALF_DEG)
+        drawing.tube(axes, view, trial.tube, floor, RIM_MM)
     if trial.cube is not None:
-        drawing.cube(axes, VIEW, trial.cube)
-    drawing.robot(
-        axes, VIEW, motion.backbone_mm[index], motion.filament_mm[index], scale=scale
-    )
-    drawing.holder(axes, VIEW, motion.arm_mm[index])
+        drawing.cube(axes, view, trial.cube)
+    drawing.robot(axes, view, motion.backbone_mm[index], motion.filament_mm[index], scale=scale)
+    drawing.holder(axes, view, motion.arm_mm[index])
     for contact in touched:
-        drawing.contact(axes, VIEW, contact, scale=scale)
+        drawing.contact(axes, view, contact, scale=scale)
     axes.set_aspect("equal")
     axes.set_axis_off()
 
@@ -145,7 +141,7 @@ def robot_picture(path: Path, trial: Trial, *, title: bool = True) -> None:
         axes = figure.add_axes((0.0, 0.0, 1.0, 0.9 if title else 1.0))
         draw_scene(axes, trial, index, floor, [contact] if contact else [], scale=1.25)
         _name_parts(axes, trial, index, contact)
-        _frame(axes, trial, floor)
+        _frame(axes, trial, floor, motion.arm_mm[index, 2] + _ABOVE_MM)
         if title:
             heading = (
                 "The bristle touches the obstacle"
@@ -160,14 +156,13 @@ def robot_picture(path: Path, trial: Trial, *, title: bool = True) -> None:
         _save(figure, path)
 
 
-def _frame(axes: Any, trial: Trial, floor: float) -> None:
-    corners = np.array([[0.0, 0.0, floor], [0.0, 0.0, TOP_MM]])
+def _frame(axes: Any, trial: Trial, floor: float, top_mm: float) -> None:
+    view = View.into(trial.tube)
+    corners = np.array([[0.0, 0.0, floor], [0.0, 0.0, top_mm]])
     if trial.tube is not None:
-        from setae.report import shapes
-
-        wall = shapes.shell(trial.tube, floor, 10.0, half_deg=HALF_DEG).reshape(-1, 3)
+        wall = shapes.shell(trial.tube, floor, RIM_MM).reshape(-1, 3)
         corners = np.concatenate([corners, wall])
-    flat = VIEW.flat(corners)
+    flat = view.flat(corners)
     axes.set_xlim(flat[:, 0].min() - 6, flat[:, 0].max() + 6)
     axes.set_ylim(flat[:, 1].min() - 6, flat[:, 1].max() + 6)
 
@@ -175,11 +170,12 @@ def _frame(axes: Any, trial: Trial, floor: float) -> None:
 def _name_parts(axes: Any, trial: Trial, index: int, contact: Contact | None) -> None:
     motion = trial.motion
     assert motion is not None
+    view = View.into(trial.tube)
     arm, backbone = motion.arm_mm[index], motion.backbone_mm[index]
     filament = motion.filament_mm[index]
     names: list[tuple[str, Any, tuple[float, float]]] = [
-        ("robot arm", arm + [0, 0, drawing.HOLDER_HEIGHT_MM + 14], (-92, 4)),
-        ("holder with four servos", arm + [0, 0, 42], (-120, 0)),
+        ("robot arm", arm + np.array([0.0, 0.0, drawing.HOLDER_HEIGHT_MM + 14]), (-92, 4)),
+        ("holder with four servos", arm + np.array([0.0, 0.0, 42.0]), (-120, 0)),
         ("spring and four tendons", backbone[9], (-118, 0)),
         ("bristle", filament.mean(axis=0), (-92, -12)),
     ]
@@ -193,7 +189,7 @@ def _name_parts(axes: Any, trial: Trial, index: int, contact: Contact | None) ->
             continue
         axes.annotate(
             text,
-            VIEW.flat(np.asarray(point)),
+            view.flat(np.asarray(point)),
             xytext=offset,
             textcoords="offset points",
             ha="right" if offset[0] < 0 else "left",
@@ -219,12 +215,12 @@ def pressure_picture(path: Path, trial: Trial) -> None:
     with _style():
         figure = _figure(11.0, 6.6)
         whole, close = figure.subplots(2, 1, height_ratios=(1.0, 1.25))
-        figure.subplots_adjust(left=0.075, right=0.985, top=0.86, bottom=0.085, hspace=0.42)
+        figure.subplots_adjust(left=0.075, right=0.985, top=0.8, bottom=0.085, hspace=0.5)
         figure.text(0.02, 0.955, "What the bristle felt", fontsize=17, weight="bold", va="center")
         figure.text(
-            0.02, 0.915,
+            0.02, 0.905,
             f"Trial {trial.number}, {origin_note([trial])}. A touch is a change of more than "
-            f"{trial.threshold_hpa:g} hPa against the pressure just before the bristle reaches out.",
+            f"{trial.threshold_hpa:g} hPa against the pressure just before each reach.",
             fontsize=10.5, color=palette.MUTED, va="center",
         )  # fmt: skip
         _pressure_axes(whole, trial, trial.start_us, trial.end_us)
@@ -237,13 +233,17 @@ def pressure_picture(path: Path, trial: Trial) -> None:
                 fontsize=9.5,
                 color=palette.MUTED,
             )
-        whole.set_title("The whole trial; above: how deep the arm was", pad=20)
+        whole.set_title("The whole trial, and how deep the arm was", pad=20)
         if level is not None:
             _pressure_axes(close, trial, level.start_us, level.end_us)
             for direction in level.directions:
                 _name_direction(close, trial, direction)
             close.set_title(f"At {level.descent_mm:.0f} mm of descent", pad=20)
         close.set_xlabel("time since the trial began (s)")
+        handles, labels = whole.get_legend_handles_labels()
+        figure.legend(
+            handles, labels, loc="upper right", bbox_to_anchor=(0.99, 0.985), ncols=3, frameon=False
+        )
         _save(figure, path)
 
 
@@ -303,7 +303,6 @@ def _pressure_axes(axes: Any, trial: Trial, start_us: int, end_us: int) -> None:
     axes.set_xlim(*trial.seconds([start_us, end_us]))
     axes.set_ylabel("pressure (hPa)")
     axes.ticklabel_format(useOffset=False)
-    axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none", ncols=3)
 
 
 # ------------------------------------------------------------------- where it touched
@@ -313,10 +312,10 @@ def directions_picture(path: Path, trials: Sequence[Trial]) -> None:
     """Draw, per trial, a rose of the directions felt at each depth; red where it touched."""
     depths = sorted({level.descent_mm for trial in trials for level in trial.levels})
     with _style():
-        figure = _figure(2.75 * max(len(trials), 2) + 0.5, 4.3)
-        figure.text(0.02, 0.94, "Where the bristle touched", fontsize=17, weight="bold")
+        figure = _figure(2.9 * max(len(trials), 2) + 0.4, 4.5)
+        figure.text(0.02, 0.93, "Where the bristle touched", fontsize=17, weight="bold")
         figure.text(
-            0.02, 0.875,
+            0.02, 0.865,
             "Looking down the tube. One ring a depth, the outermost the deepest; one sector a "
             f"direction α. {origin_note(trials).capitalize()}.",
             fontsize=10.5, color=palette.MUTED,
@@ -324,7 +323,7 @@ def directions_picture(path: Path, trials: Sequence[Trial]) -> None:
         width = 1.0 / len(trials)
         for position, trial in enumerate(trials):
             axes = figure.add_axes(
-                (position * width + 0.08 * width, 0.1, 0.84 * width, 0.62), projection="polar"
+                (position * width + 0.1 * width, 0.13, 0.8 * width, 0.57), projection="polar"
             )
             _rose(axes, trial, depths)
             below = trial.obstacle_below_tip_mm
@@ -365,7 +364,7 @@ def _rose(axes: Any, trial: Trial, depths: Sequence[float]) -> None:
             axes.bar(
                 np.radians(alpha),
                 0.9,
-                width * 0.94,
+                width - 0.12 / (ring + 1.65),
                 bottom=ring + 1.2,
                 color="white" if touched is None else palette.CONTACT if touched else palette.CLEAR,
                 edgecolor="#d5dce2" if touched is None else "white",
@@ -373,8 +372,8 @@ def _rose(axes: Any, trial: Trial, depths: Sequence[float]) -> None:
                 linewidth=0.7,
             )
         axes.text(
-            np.radians(22.5), ring + 1.65, f"{depth:.0f}", fontsize=6.5, ha="center", va="center",
-            color=palette.MUTED,
+            width / 2, ring + 1.65, f"{depth:.0f}", fontsize=6.5, ha="center", va="center",
+            color=palette.MUTED, bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none"},
         )  # fmt: skip
     axes.set_ylim(0, len(depths) + 1.3)
     axes.set_yticks([])
@@ -464,7 +463,7 @@ def animation(path: Path, trial: Trial, *, frames: int = 110, width_px: int = 62
             now_us = int(motion.time_us[index])
             touched = [c for c in trial.contacts if c.time_us <= now_us]
             draw_scene(axes, trial, index, floor, touched, scale=0.9)
-            _frame(axes, trial, floor)
+            _frame(axes, trial, floor, motion.arm_mm[0, 2] + _ABOVE_MM)
             descent = -motion.arm_mm[index, 2] + motion.arm_mm[0, 2]
             figure.text(
                 0.03, 0.955, f"{descent:3.0f} mm down", fontsize=13, weight="bold", va="center"
@@ -477,16 +476,13 @@ def animation(path: Path, trial: Trial, *, frames: int = 110, width_px: int = 62
                 color=palette.CONTACT if touched else palette.MUTED,
                 weight="bold" if touched else "normal",
             )  # fmt: skip
-            figure.set_dpi(width_px / 5.2)
-            figure.canvas.draw()
-            frame = image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
-            images.append(frame)
+            buffer = BytesIO()
+            figure.savefig(buffer, dpi=width_px / 5.2, format="png")
+            images.append(image.open(buffer).convert("RGB"))
     # One palette for all frames, or the background would flicker.
     base = images[len(images) // 2].quantize(colors=128, method=image.Quantize.MEDIANCUT)
     flat = [frame.quantize(palette=base, dither=image.Dither.NONE) for frame in images]
-    flat[0].save(
-        path, save_all=True, append_images=flat[1:], duration=90, loop=0, optimize=True
-    )
+    flat[0].save(path, save_all=True, append_images=flat[1:], duration=90, loop=0, optimize=True)
 
 
 def _story(trial: Trial, frames: int) -> list[int]:

@@ -73,16 +73,19 @@ def ring(centre_mm: Floats, first: Floats, second: Floats, radius_mm: float) -> 
     return centre_mm + radius_mm * (np.cos(angle) * first + np.sin(angle) * second)
 
 
-def shell_angles(tube: Tube, half_deg: float) -> Floats:
-    """Angles (world, about the tube's axis) of the part of the tube nearest to the robot."""
-    towards = np.arctan2(-tube.axis_mm[1], -tube.axis_mm[0])
-    half = np.radians(half_deg)
-    return np.asarray(np.linspace(towards - half, towards + half, 61))
+def towards_wall_rad(tube: Tube | None) -> float:
+    """Direction (world) from the tube's axis to the robot, where the wall is near."""
+    return 0.0 if tube is None else float(np.arctan2(-tube.axis_mm[1], -tube.axis_mm[0]))
 
 
-def shell(tube: Tube, bottom_mm: float, top_mm: float, *, half_deg: float = 75.0) -> Floats:
+# Seen from 225 degrees, the wall's outline is at -45: no part of it hides another.
+EYE_DEG = 225.0
+WALL_DEG = (-45.0, 65.0)
+
+
+def shell(tube: Tube, bottom_mm: float, top_mm: float) -> Floats:
     """Part of the tube's wall nearest to the robot, (2, 61, 3): lower and upper edge."""
-    angle = shell_angles(tube, half_deg)
+    angle = towards_wall_rad(tube) + np.radians(np.linspace(*WALL_DEG, 61))
     x = tube.axis_mm[0] + tube.inner_radius_mm * np.cos(angle)
     y = tube.axis_mm[1] + tube.inner_radius_mm * np.sin(angle)
     return np.stack([np.stack([x, y, np.full_like(x, z)], axis=1) for z in (bottom_mm, top_mm)])

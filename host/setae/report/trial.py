@@ -201,7 +201,8 @@ class Trial:
 
 def to_world(point_mm: Any, arm_mm: Any) -> Floats:
     """Frame D to the world: D hangs from the arm with its z down; (..., 3) → (..., 3)."""
-    return np.asarray(point_mm, dtype=float) * (1.0, -1.0, -1.0) + np.asarray(arm_mm, dtype=float)
+    flipped = np.asarray(point_mm, dtype=float) * np.array([1.0, -1.0, -1.0])
+    return np.asarray(flipped + np.asarray(arm_mm, dtype=float))
 
 
 def load(log: Log, *, number: int = 1) -> Trial:

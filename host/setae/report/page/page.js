@@ -125,12 +125,30 @@ function siliconePoints(shape, frames) {
 }
 
 // ---------------------------------------------------------------------- scene
-const matt = { ambient: 0.62, diffuse: 0.6, specular: 0.08, roughness: 0.9, fresnel: 0.05 };
-const metal = { ambient: 0.5, diffuse: 0.75, specular: 0.5, roughness: 0.35, fresnel: 0.1 };
-const light = { x: -3000, y: -1500, z: 4000 };
-const mesh = (points, faces, tone, more = {}) => ({
-  type: "mesh3d", ...columns(points), ...faces, color: tone, hoverinfo: "skip", lighting: matt,
-  lightposition: light, showlegend: false, ...more,
+// Shades are worked out here, once for each mesh: Plotly's own light fails in a
+// parallel projection, which keeps the picture to scale.
+const eyeAt = [Math.cos(run.view_rad), Math.sin(run.view_rad), 0];
+const sun = unit(add(add(eyeAt, cross([0, 0, 1], eyeAt), -0.75), [0, 0, 1], 0.9));
+const rgb = (text) => [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16));
+const tint = (tone, normal, depth) => {
+  const lit = dot(normal, sun), c = rgb(tone);
+  const to = lit > 0.55 ? [255, 255, 255] : [31, 41, 51];
+  const share = lit > 0.55 ? 0.75 * (lit - 0.55) : depth * (0.55 - lit);
+  return `rgb(${c.map((v, i) => Math.round(v + (to[i] - v) * share)).join(",")})`;
+};
+const faceNormals = (points, f) => f.i.map((_, n) =>
+  cross(add(points[f.j[n]], points[f.i[n]], -1), add(points[f.k[n]], points[f.i[n]], -1)));
+function shaded(points, faces, tone, { flat = false, depth = 0.3, outward = null } = {}) {
+  const normals = faceNormals(points, faces), sign = outward ? outward : () => 1;
+  if (flat) return { facecolor: normals.map((n, i) => tint(tone, unit(mixed([0, 0, 0], n, sign(n, points[faces.i[i]]))), depth)) };
+  const sums = points.map(() => [0, 0, 0]);
+  normals.forEach((n, t) => { for (const key of ["i", "j", "k"]) sums[faces[key][t]] = add(sums[faces[key][t]], n); });
+  return { vertexcolor: sums.map((n, i) => tint(tone, unit(mixed([0, 0, 0], n, sign(n, points[i]))), depth)) };
+}
+const even = { ambient: 1, diffuse: 0, specular: 0, roughness: 1, fresnel: 0 };
+const mesh = (points, faces, tone, how, more = {}) => ({
+  type: "mesh3d", ...columns(points), ...faces, ...shaded(points, faces, tone, how), hoverinfo: "skip",
+  lighting: even, showlegend: false, ...more,
 });
 const line = (points, tone, width, more = {}) => ({
   type: "scatter3d", mode: "lines", ...columns(points), line: { color: tone, width },
@@ -141,7 +159,7 @@ function tubeTraces(tube, floor) {
   if (!tube) return [];
   const towards = Math.atan2(-tube.axis_mm[1], -tube.axis_mm[0]), n = 72, top = 10;
   const point = (s, z) => {
-    const a = towards + (-46 + 112 * s) * Math.PI / 180;
+    const [from, to] = run.wall_deg, a = towards + (from + (to - from) * s) * Math.PI / 180;
     return [tube.axis_mm[0] + tube.inner_radius_mm * Math.cos(a), tube.axis_mm[1] + tube.inner_radius_mm * Math.sin(a), z];
   };
   const arc = (z) => Array.from({ length: n + 1 }, (_, k) => point(k / n, z));
@@ -149,10 +167,11 @@ function tubeTraces(tube, floor) {
   for (let k = 0; k < n; k++) {
     faces.i.push(k, k + 1); faces.j.push(k + 1, k + n + 2); faces.k.push(k + n + 1, k + n + 1);
   }
+  const inwards = (n, p) => Math.sign(n[0] * (tube.axis_mm[0] - p[0]) + n[1] * (tube.axis_mm[1] - p[1]));
   const rings = [];
   for (let z = Math.ceil(floor / 20) * 20; z < top; z += 20) rings.push(...arc(z), null);
   return [
-    mesh([...low, ...high], faces, colour.tube, { opacity: 0.34, lighting: { ...matt, ambient: 0.75 } }),
+    mesh([...low, ...high], faces, colour.tube, { depth: 0.12, outward: inwards }, { opacity: 0.5 }),
     line(rings, "rgba(255,255,255,0.85)", 2),
     line([...low, ...high.reverse(), low[0]], "#7391ab", 3),
   ];
@@ -167,7 +186,7 @@ function cubeTraces(cube) {
   for (const [a, b, d, e] of quads) { faces.i.push(a, a); faces.j.push(b, d); faces.k.push(d, e); }
   const edges = [[0,1],[1,3],[3,2],[2,0],[4,5],[5,7],[7,6],[6,4],[0,4],[1,5],[2,6],[3,7]];
   return [
-    mesh(p, faces, colour.cube, { flatshading: true, opacity: 0.96 }),
+    mesh(p, faces, colour.cube, { flat: true, outward: (n, q) => Math.sign(dot(n, add(q, cube.centre_mm, -1))) }),
     line(edges.flatMap(([a, b]) => [p[a], p[b], null]), "#7d6440", 3),
   ];
 }
@@ -183,11 +202,25 @@ function dynamicTraces(shape) {
       frames[i].second, run.robot.tendon_radius_mm * Math.sin(a))));
     tendons.push(null);
   }
-  const touches = trial.contacts.filter((c) => c.time_s <= now && c.point_mm).map((c) => c.point_mm);
   return [
     holderPoints(shape.arm), pipe(wire, 0.85), capPoints(shape, frames), siliconePoints(shape, frames),
-    tendons, pipe(shape.filament, 0.7), trail(), touches,
+    tendons, pipe(shape.filament, 0.9), trail(), touchPoints(),
   ];
+}
+// A ball at each touch; before its time it has no size.
+const BALL = 9;
+function touchPoints() {
+  return trial.contacts.filter((c) => c.point_mm).flatMap((c) => turned(Array.from({ length: BALL }, (_, i) => {
+    const a = Math.PI * i / (BALL - 1), r = c.time_s <= now ? 4.2 : 0.001;
+    return [add(c.point_mm, [0, 0, r * Math.cos(a)]), r * Math.sin(a) + 1e-4];
+  }), [1, 0, 0], [0, 1, 0]));
+}
+function touchFaces() {
+  const one = pipeFaces(BALL, ROUND), all = { i: [], j: [], k: [] };
+  trial.contacts.filter((c) => c.point_mm).forEach((_, n) => {
+    for (const key of ["i", "j", "k"]) all[key].push(...one[key].map((v) => v + n * BALL * ROUND));
+  });
+  return all;
 }
 // The tip's way in the last seconds.
 function trail() {
@@ -210,28 +243,27 @@ function buildScene() {
   const still = [...tubeTraces(trial.tube, run.floor_mm), ...cubeTraces(trial.cube)];
   const traces = [
     ...still,
-    mesh(d[0], pipeFaces(8, ROUND), colour.holder, { lighting: matt }),
-    mesh(d[1], pipeFaces(COILS * STEPS_PER_COIL + 1, SIDES), colour.spring, { lighting: metal }),
+    mesh(d[0], pipeFaces(8, ROUND), colour.holder, { depth: 0.4 }),
+    mesh(d[1], pipeFaces(COILS * STEPS_PER_COIL + 1, SIDES), colour.spring, { depth: 0.6 }),
     mesh(d[2], pipeFaces(5, ROUND), "#dfe5ea"),
     mesh(d[3], pipeFaces(5, ROUND), colour.silicone),
     line(d[4], colour.tendon, 4),
     mesh(d[5], pipeFaces(2, SIDES), colour.bristle),
-    line(d[6], "rgba(224,123,26,0.45)", 3),
-    { type: "scatter3d", mode: "markers", ...columns(d[7]), hoverinfo: "skip", showlegend: false,
-      marker: { size: 7, color: colour.contact, line: { color: "#fff", width: 1 } } },
+    line(d[6], "#eeb27c", 3),
+    mesh(d[7], touchFaces(), colour.contact, { depth: 0 }),
   ];
   dynamic = d.map((_, i) => still.length + i);
   const range = run.bounds_mm, hidden = { visible: false, showspikes: false };
-  const size = range.map(([a, b]) => b - a), largest = Math.max(...size);
-  const a = run.view_rad, camera = {
-    eye: { x: 1.42 * Math.cos(a), y: 1.42 * Math.sin(a), z: 0.42 },
-    center: { x: 0, y: 0, z: -0.02 }, up: { x: 0, y: 0, z: 1 },
+  const size = range.map(([a, b]) => b - a), scale = 1.9 / size[2], a = run.view_rad;
+  const camera = {
+    projection: { type: "orthographic" }, up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: -0.06 },
+    eye: { x: 2 * Math.cos(a), y: 2 * Math.sin(a), z: 0.68 },
   };
   Plotly.react(box, traces, {
     margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", uirevision: "scene",
     scene: {
       xaxis: { ...hidden, range: range[0] }, yaxis: { ...hidden, range: range[1] }, zaxis: { ...hidden, range: range[2] },
-      aspectmode: "manual", aspectratio: { x: size[0] / largest, y: size[1] / largest, z: size[2] / largest },
+      aspectmode: "manual", aspectratio: { x: size[0] * scale, y: size[1] * scale, z: size[2] * scale },
       camera, dragmode: "turntable",
     },
   }, { displaylogo: false, responsive: true, displayModeBar: false }).then(() => { sceneReady = true; });
@@ -281,11 +313,11 @@ function buildPressure() {
       text: touches.map((c) => `${c.change_hpa.toFixed(1)} hPa against the baseline, ${c.alpha_deg === null ? "on the way down" : `α = ${c.alpha_deg}°`}`),
       hovertemplate: "touch: %{text}<extra></extra>" },
   ], {
-    margin: { l: 74, r: 14, t: 26, b: 62 }, font: { family: "inherit", size: 13.5, color: colour.ink }, shapes,
+    margin: { l: 74, r: 14, t: 66, b: 50 }, font: { family: "inherit", size: 13.5, color: colour.ink }, shapes,
     annotations: notes, paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "closest", dragmode: "zoom",
     xaxis: { title: { text: "time since the trial began (s)" }, range: [0, trial.duration_s], showgrid: false, zeroline: false, ticks: "outside", tickcolor: "#c5ced6" },
     yaxis: { title: { text: "pressure (hPa)" }, gridcolor: "rgba(31,41,51,0.07)", zeroline: false, tickformat: ".0f" },
-    legend: { orientation: "h", x: 1, xanchor: "right", y: -0.16, yanchor: "top" },
+    legend: { orientation: "h", x: 0, xanchor: "left", y: 1.12, yanchor: "bottom" },
   }, { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] }).then(() => moveCursor());
 }
 function moveCursor() {
@@ -386,7 +418,7 @@ function tick(time) {
 const label = (t) => t.obstacle_below_tip_mm === null ? "no obstacle" : `obstacle ${t.obstacle_below_tip_mm} mm below`;
 run.trials.forEach((t, i) => {
   const tab = document.createElement("button");
-  tab.role = "tab"; tab.textContent = `Trial ${t.number}: ${label(t)}`;
+  tab.setAttribute("role", "tab"); tab.textContent = `Trial ${t.number}: ${t.obstacle_below_tip_mm === null ? "no obstacle" : `${t.obstacle_below_tip_mm} mm below`}`;
   tab.onclick = () => { play(false); choose(i); };
   $("tabs").append(tab);
   const figure = document.createElement("figure");
