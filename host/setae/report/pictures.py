@@ -69,12 +69,13 @@ def write_all(folder: Path, trials: Sequence[Trial]) -> tuple[Path, ...]:
     if shown.motion is not None:
         robot_picture(folder / "robot.png", shown)
         written.append(folder / "robot.png")
+    pressure_picture(folder / "pressure.png", shown)
+    written.append(folder / "pressure.png")
     for name, draw in (
-        ("pressure", lambda path: pressure_picture(path, shown)),
-        ("directions", lambda path: directions_picture(path, trials)),
-        ("trials", lambda path: trials_picture(path, trials)),
+        ("directions", directions_picture),
+        ("trials", trials_picture),
     ):
-        draw(folder / f"{name}.png")
+        draw(folder / f"{name}.png", trials)
         written.append(folder / f"{name}.png")
     return tuple(written)
 
