@@ -20,7 +20,8 @@ void Arm::move(int64_t now_us, const Vec3& target_mm, double speed_mm_s,
   start_speed_mm_s_ = 0;
   const Vec3 way = target_mm - start_mm_;
   distance_mm_ = norm(way);
-  if (distance_mm_ == 0) return;
+  if (distance_mm_ == 0)
+    return;
   target_mm_ = target_mm;
   direction_ = (1 / distance_mm_) * way;
   const double speed = std::min(speed_mm_s, std::sqrt(distance_mm_ * acceleration_mm_s2));
@@ -32,7 +33,8 @@ void Arm::move(int64_t now_us, const Vec3& target_mm, double speed_mm_s,
 
 void Arm::stop(int64_t now_us, double acceleration_mm_s2) {
   const Motion motion = at(now_us);
-  if (motion.ended) return;
+  if (motion.ended)
+    return;
   const double left_mm = distance_mm_ - motion.along_mm;
   const double speed = motion.speed_mm_s;
   const double braking = std::max(acceleration_mm_s2, 0.5 * speed * speed / left_mm);
@@ -50,10 +52,10 @@ Arm::Motion Arm::at(int64_t now_us) const {
   Motion motion = {0, start_speed_mm_s_, false};
   for (const Phase& phase : phases_) {
     const double spent_s = std::min(left_s, phase.duration_s);
-    motion.along_mm +=
-        spent_s * (motion.speed_mm_s + 0.5 * phase.acceleration_mm_s2 * spent_s);
+    motion.along_mm += spent_s * (motion.speed_mm_s + 0.5 * phase.acceleration_mm_s2 * spent_s);
     motion.speed_mm_s += phase.acceleration_mm_s2 * spent_s;
-    if (left_s < phase.duration_s) return motion;
+    if (left_s < phase.duration_s)
+      return motion;
     left_s -= spent_s;
   }
   return {distance_mm_, 0, true};
@@ -64,7 +66,9 @@ Vec3 Arm::position_mm(int64_t now_us) const {
   return motion.ended ? target_mm_ : start_mm_ + motion.along_mm * direction_;
 }
 
-bool Arm::moving(int64_t now_us) const { return !at(now_us).ended; }
+bool Arm::moving(int64_t now_us) const {
+  return !at(now_us).ended;
+}
 
 }  // namespace sim
 }  // namespace setae

@@ -15,7 +15,9 @@ constexpr int kSubsteps = 8;
 Bristle::Bristle(const BristleSettings& settings, uint64_t seed)
     : settings_(settings), noise_(seed, 1), drift_(seed, 2) {}
 
-void Bristle::place(const Vec3& root_mm) { root_mm_ = root_mm; }
+void Bristle::place(const Vec3& root_mm) {
+  root_mm_ = root_mm;
+}
 
 void Bristle::step(double duration_s, const Vec3& root_mm, const Vec3& axis, double depth_mm) {
   const Vec3 velocity = (1 / duration_s) * (root_mm - root_mm_);
@@ -26,8 +28,7 @@ void Bristle::step(double duration_s, const Vec3& root_mm, const Vec3& axis, dou
   // Implicit steps: stable at every frequency that may be asked for.
   const double omega = kTwoPi * settings_.natural_frequency_hz;
   const double h = duration_s / kSubsteps;
-  const double scale =
-      1 / (1 + 2 * settings_.damping_ratio * omega * h + omega * omega * h * h);
+  const double scale = 1 / (1 + 2 * settings_.damping_ratio * omega * h + omega * omega * h * h);
   for (int i = 0; i < kSubsteps; ++i) {
     lag_rate_ = scale * (lag_rate_ + (h * omega * omega) * (acceleration - lag_mm_s2_));
     lag_mm_s2_ = lag_mm_s2_ + h * lag_rate_;
@@ -41,8 +42,8 @@ void Bristle::step(double duration_s, const Vec3& root_mm, const Vec3& axis, dou
   const double most = settings_.contact_saturation_hpa;
   const double touch_hpa =
       most * (1 - std::exp(-settings_.contact_hpa_per_mm * std::max(depth_mm, 0.0) / most));
-  relaxed_hpa_ += (touch_hpa - relaxed_hpa_) *
-                  (1 - std::exp(-duration_s / settings_.relaxation_time_s));
+  relaxed_hpa_ +=
+      (touch_hpa - relaxed_hpa_) * (1 - std::exp(-duration_s / settings_.relaxation_time_s));
   contact_hpa_ = touch_hpa - settings_.relaxation_fraction * relaxed_hpa_;
 
   drift_hpa_ += settings_.drift_hpa_per_sqrt_s * std::sqrt(duration_s) * drift_.normal();

@@ -30,9 +30,9 @@ double Environment::depth_mm(const Vec3& point_mm) const {
     const Vec3 away = point_mm - box.centre;
     const double x = box.cosine * away.x + box.sine * away.y;
     const double y = -box.sine * away.x + box.cosine * away.y;
-    deepest = std::max(deepest, std::min({box.half_edges.x - std::fabs(x),
-                                          box.half_edges.y - std::fabs(y),
-                                          box.half_edges.z - std::fabs(away.z)}));
+    deepest = std::max(deepest,
+                       std::min({box.half_edges.x - std::fabs(x), box.half_edges.y - std::fabs(y),
+                                 box.half_edges.z - std::fabs(away.z)}));
   }
   return deepest;
 }
@@ -43,7 +43,8 @@ Contact Environment::deepest(const Vec3& root_mm, const Vec3& tip_mm) const {
     const double along = static_cast<double>(i) / (kFilamentPoints - 1);
     const Vec3 point = root_mm + along * (tip_mm - root_mm);
     const double depth = depth_mm(point);
-    if (depth > contact.depth_mm) contact = {depth, point};
+    if (depth > contact.depth_mm)
+      contact = {depth, point};
   }
   return contact;
 }

@@ -14,16 +14,15 @@ struct Entry {
 };
 
 // The name in the table is the member's, so that the two can't differ.
-#define SETAE_ONE(group, member, value, least, most)       \
-  {#group "." #member, value, least, most,                 \
-   [](Parameters& p) -> double& { return p.group.member; }}
-#define SETAE_ITEM(group, member, index, value, least, most)       \
-  {#group "." #member "_" #index, value, least, most,              \
+#define SETAE_ONE(group, member, value, least, most) \
+  {#group "." #member, value, least, most, [](Parameters& p) -> double& { return p.group.member; }}
+#define SETAE_ITEM(group, member, index, value, least, most) \
+  {#group "." #member "_" #index, value, least, most,        \
    [](Parameters& p) -> double& { return p.group.member[index]; }}
-#define SETAE_FOUR(group, member, value, least, most)      \
-  SETAE_ITEM(group, member, 0, value, least, most),        \
-      SETAE_ITEM(group, member, 1, value, least, most),    \
-      SETAE_ITEM(group, member, 2, value, least, most),    \
+#define SETAE_FOUR(group, member, value, least, most)   \
+  SETAE_ITEM(group, member, 0, value, least, most),     \
+      SETAE_ITEM(group, member, 1, value, least, most), \
+      SETAE_ITEM(group, member, 2, value, least, most), \
       SETAE_ITEM(group, member, 3, value, least, most)
 
 constexpr double kUsPerDegree = 2000.0 / 180.0;
@@ -99,7 +98,8 @@ const Entry kEntries[] = {
 
 const Entry* find(const std::string& name) {
   for (const Entry& entry : kEntries) {
-    if (name == entry.name) return &entry;
+    if (name == entry.name)
+      return &entry;
   }
   return nullptr;
 }
@@ -113,11 +113,14 @@ bool fail(std::string& error, const std::string& text) {
 
 Parameters default_parameters() {
   Parameters parameters{};
-  for (const Entry& entry : kEntries) entry.at(parameters) = entry.value;
+  for (const Entry& entry : kEntries)
+    entry.at(parameters) = entry.value;
   return parameters;
 }
 
-int parameter_count() { return static_cast<int>(sizeof kEntries / sizeof kEntries[0]); }
+int parameter_count() {
+  return static_cast<int>(sizeof kEntries / sizeof kEntries[0]);
+}
 
 const char* parameter_name(int index) {
   return index >= 0 && index < parameter_count() ? kEntries[index].name : nullptr;
@@ -126,7 +129,8 @@ const char* parameter_name(int index) {
 bool set_parameter(Parameters& parameters, const std::string& name, double value,
                    std::string& error) {
   const Entry* entry = find(name);
-  if (entry == nullptr) return fail(error, "no parameter is named \"" + name + "\"");
+  if (entry == nullptr)
+    return fail(error, "no parameter is named \"" + name + "\"");
   if (!(value >= entry->least && value <= entry->most)) {  // NaN fails both
     char text[160];
     std::snprintf(text, sizeof text, "%s must be between %g and %g, not %g", entry->name,
@@ -134,9 +138,11 @@ bool set_parameter(Parameters& parameters, const std::string& name, double value
     return fail(error, text);
   }
   const bool is_direction = name.compare(0, 16, "servo.direction_") == 0;
-  if (is_direction && std::fabs(value) != 1) return fail(error, name + " must be 1 or -1");
+  if (is_direction && std::fabs(value) != 1)
+    return fail(error, name + " must be 1 or -1");
   const bool is_switch = name == "board.pose_known";
-  if (is_switch && value != 0 && value != 1) return fail(error, name + " must be 0 or 1");
+  if (is_switch && value != 0 && value != 1)
+    return fail(error, name + " must be 0 or 1");
   entry->at(parameters) = value;
   return true;
 }
@@ -144,7 +150,8 @@ bool set_parameter(Parameters& parameters, const std::string& name, double value
 bool get_parameter(const Parameters& parameters, const std::string& name, double& value,
                    std::string& error) {
   const Entry* entry = find(name);
-  if (entry == nullptr) return fail(error, "no parameter is named \"" + name + "\"");
+  if (entry == nullptr)
+    return fail(error, "no parameter is named \"" + name + "\"");
   value = entry->at(const_cast<Parameters&>(parameters));  // read only
   return true;
 }

@@ -26,7 +26,8 @@ Rigidity rigidity_of(const PlantSettings& s) {
 
 double inner(const Modes& a, const Modes& b) {
   double sum = 0;
-  for (int m = 0; m < kModes; ++m) sum += a[m] * b[m];
+  for (int m = 0; m < kModes; ++m)
+    sum += a[m] * b[m];
   return sum;
 }
 
@@ -48,7 +49,8 @@ Plant::Plant(const PlantSettings& settings)
 void Plant::settle(const std::array<double, kTendons>& lengths_mm) {
   lengths_mm_ = lengths_mm;
   double shortest = settings_.free_length_mm;
-  for (double length : lengths_mm) shortest = std::min(shortest, length);
+  for (double length : lengths_mm)
+    shortest = std::min(shortest, length);
   anchor_ = rod_.compressed(shortest);
   damping_ = 0;
   secant_known_ = false;
@@ -87,7 +89,8 @@ void Plant::evaluate(const Modes& modes, State& state) {
     state.paths[i].solve(state.shape, holes_[i], holes_[i], settings_.bore_radius_mm);
     const double stretch = state.paths[i].length_mm() - lengths_mm_[i];
     state.tension_n[i] = stretch > 0 ? settings_.tendon_stiffness_n_per_mm * stretch : 0;
-    if (stretch <= 0) continue;
+    if (stretch <= 0)
+      continue;
     state.energy += 0.5 * state.tension_n[i] * stretch;
     state.path_gradient[i] = Modes{};
     rod_.pull_back(state.shape, state.paths[i].wrenches(), state.path_gradient[i]);
@@ -96,17 +99,20 @@ void Plant::evaluate(const Modes& modes, State& state) {
     }
   }
   add_weight(state);
-  for (int m = 0; m < kModes; ++m) state.gradient[m] += state.geometric[m];
+  for (int m = 0; m < kModes; ++m)
+    state.gradient[m] += state.geometric[m];
   add_solid(state);
 }
 
 void Plant::add_weight(State& state) const {
-  if (settings_.gravity_m_s2 == 0) return;
+  if (settings_.gravity_m_s2 == 0)
+    return;
   std::array<Wrench, kStations> wrenches;
   for (int j = 0; j < kStations; ++j) {
     const bool end = j == 0 || j == kElements;
     double mass_g = settings_.spring_mass_g / kElements * (end ? 0.5 : 1.0);
-    if (j == kElements) mass_g += settings_.tip_mass_g;
+    if (j == kElements)
+      mass_g += settings_.tip_mass_g;
     const double weight_n = 1e-3 * mass_g * settings_.gravity_m_s2;
     state.energy -= weight_n * state.shape.position[j].z;
     wrenches[j] = {{0, 0, 0}, into(state.shape.rotation[j], {0, 0, -weight_n})};
@@ -131,7 +137,8 @@ void Plant::add_solid(State& state) const {
   const double stiffness = solid_penalty_ * rod_.element_mm();
   SolidContact contact;
   for (int e = 0; e < kElements; ++e) {
-    if (!solid_contact(state.shape.strain[e], contact)) continue;
+    if (!solid_contact(state.shape.strain[e], contact))
+      continue;
     state.energy += 0.5 * stiffness * contact.gap * contact.gap;
     const double force = stiffness * contact.gap;
     rod_.pull_back_strain(e, {force * contact.slope.curvature, force * contact.slope.stretch},
@@ -143,7 +150,8 @@ void Plant::add_solid_hessian(const State& state, Matrix& hessian) const {
   const double stiffness = solid_penalty_ * rod_.element_mm();
   SolidContact contact;
   for (int e = 0; e < kElements; ++e) {
-    if (!solid_contact(state.shape.strain[e], contact)) continue;
+    if (!solid_contact(state.shape.strain[e], contact))
+      continue;
     Modes slope{}, by_x{}, by_y{};
     rod_.pull_back_strain(e, contact.slope, slope);
     rod_.pull_back_strain(e, {{1, 0, 0}, {0, 0, 0}}, by_x);
@@ -172,7 +180,8 @@ void Plant::solve() {
   }
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     residual_ = std::sqrt(inner(state_.gradient, state_.gradient));
-    if (residual_ < kTolerance) return;
+    if (residual_ < kTolerance)
+      return;
     if (since_rebuild >= kPatience) {
       rebuild_secant();
       fresh = true;
@@ -185,7 +194,8 @@ void Plant::solve() {
     bool accepted = false;
     for (int halving = 0; descends && halving < 25; ++halving) {
       Modes modes = state_.modes;
-      for (int m = 0; m < kModes; ++m) modes[m] += fraction * step[m];
+      for (int m = 0; m < kModes; ++m)
+        modes[m] += fraction * step[m];
       trial_.paths = state_.paths;
       evaluate(modes, trial_);
       if (trial_.energy <= state_.energy + 1e-4 * fraction * slope + 1e-11) {
@@ -200,7 +210,8 @@ void Plant::solve() {
       ++since_rebuild;
       fresh = false;
     } else {
-      if (fresh) break;
+      if (fresh)
+        break;
       rebuild_secant();
       fresh = true;
       since_rebuild = 0;
@@ -212,12 +223,15 @@ void Plant::solve() {
 // Step from the modified Newton system; false if it can't be made to descend.
 bool Plant::newton_step(Modes& step) const {
   Matrix hessian = secant_;
-  for (int m = 0; m < kModes; ++m) hessian[m][m] += 1 + damping_;
+  for (int m = 0; m < kModes; ++m)
+    hessian[m][m] += 1 + damping_;
   for (int i = 0; i < kTendons; ++i) {
-    if (state_.tension_n[i] <= 0) continue;
+    if (state_.tension_n[i] <= 0)
+      continue;
     for (int m = 0; m < kModes; ++m) {
       const double weight = settings_.tendon_stiffness_n_per_mm * state_.path_gradient[i][m];
-      for (int k = 0; k <= m; ++k) hessian[m][k] += weight * state_.path_gradient[i][k];
+      for (int k = 0; k <= m; ++k)
+        hessian[m][k] += weight * state_.path_gradient[i][k];
     }
   }
   add_solid_hessian(state_, hessian);
@@ -229,10 +243,12 @@ bool Plant::newton_step(Modes& step) const {
     for (int m = 0; m < kModes && positive; ++m) {
       for (int k = 0; k <= m; ++k) {
         double sum = hessian[m][k] + (m == k ? shift : 0);
-        for (int l = 0; l < k; ++l) sum -= factor[m][l] * factor[k][l];
+        for (int l = 0; l < k; ++l)
+          sum -= factor[m][l] * factor[k][l];
         if (m == k) {
           positive = sum > 1e-3;
-          if (!positive) break;
+          if (!positive)
+            break;
           factor[m][m] = std::sqrt(sum);
         } else {
           factor[m][k] = sum / factor[k][k];
@@ -245,12 +261,14 @@ bool Plant::newton_step(Modes& step) const {
     }
     for (int m = 0; m < kModes; ++m) {
       double sum = -state_.gradient[m];
-      for (int k = 0; k < m; ++k) sum -= factor[m][k] * step[k];
+      for (int k = 0; k < m; ++k)
+        sum -= factor[m][k] * step[k];
       step[m] = sum / factor[m][m];
     }
     for (int m = kModes - 1; m >= 0; --m) {
       double sum = step[m];
-      for (int k = m + 1; k < kModes; ++k) sum -= factor[k][m] * step[k];
+      for (int k = m + 1; k < kModes; ++k)
+        sum -= factor[k][m] * step[k];
       step[m] = sum / factor[m][m];
     }
     return inner(step, state_.gradient) < 0;
@@ -264,14 +282,16 @@ Modes Plant::frozen_gradient(const State& state,
   Modes out = state.geometric;
   for (int i = 0; i < kTendons; ++i) {
     const double extra = tension_n[i] - state.tension_n[i];
-    if (extra == 0) continue;
+    if (extra == 0)
+      continue;
     Modes gradient{};
     if (state.tension_n[i] > 0) {
       gradient = state.path_gradient[i];
     } else {
       rod_.pull_back(state.shape, state.paths[i].wrenches(), gradient);
     }
-    for (int m = 0; m < kModes; ++m) out[m] += extra * gradient[m];
+    for (int m = 0; m < kModes; ++m)
+      out[m] += extra * gradient[m];
   }
   return out;
 }
@@ -300,14 +320,17 @@ void Plant::rebuild_secant() {
 void Plant::update_secant(const State& from, const State& to) {
   const Modes before = frozen_gradient(from, to.tension_n);
   Modes step, rest;
-  for (int m = 0; m < kModes; ++m) step[m] = to.modes[m] - from.modes[m];
+  for (int m = 0; m < kModes; ++m)
+    step[m] = to.modes[m] - from.modes[m];
   for (int m = 0; m < kModes; ++m) {
     rest[m] = to.geometric[m] - before[m] - inner(secant_[m], step);
   }
   const double along = inner(rest, step);
-  if (std::fabs(along) < 1e-3 * std::sqrt(inner(rest, rest) * inner(step, step))) return;
+  if (std::fabs(along) < 1e-3 * std::sqrt(inner(rest, rest) * inner(step, step)))
+    return;
   for (int m = 0; m < kModes; ++m) {
-    for (int k = 0; k < kModes; ++k) secant_[m][k] += rest[m] * rest[k] / along;
+    for (int k = 0; k < kModes; ++k)
+      secant_[m][k] += rest[m] * rest[k] / along;
   }
 }
 

@@ -75,7 +75,7 @@ class Plant {
   // Touching coils of one element.
   struct SolidContact {
     double gap, bend_per_mm;
-    double x, y;    // direction of the bend
+    double x, y;   // direction of the bend
     Strain slope;  // of the gap
   };
 
@@ -96,11 +96,11 @@ class Plant {
   double solid_penalty_;
   double solid_ratio_;
   std::array<double, kTendons> lengths_mm_{};
-  Modes anchor_{};         // where the damper pulls to: the last step's end
-  double damping_ = 0;     // relative to the rod's own stiffness
+  Modes anchor_{};      // where the damper pulls to: the last step's end
+  double damping_ = 0;  // relative to the rod's own stiffness
   State state_{};
   State trial_{};
-  Matrix secant_{};        // geometric stiffness, learnt from step to step
+  Matrix secant_{};  // geometric stiffness, learnt from step to step
   bool secant_known_ = false;
   double residual_ = 0;
   bool creeping_ = false;

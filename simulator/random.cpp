@@ -14,14 +14,17 @@ uint64_t splitmix(uint64_t& state) {
   return z ^ (z >> 31);
 }
 
-uint64_t rotate(uint64_t x, int bits) { return (x << bits) | (x >> (64 - bits)); }
+uint64_t rotate(uint64_t x, int bits) {
+  return (x << bits) | (x >> (64 - bits));
+}
 
 }  // namespace
 
 Random::Random(uint64_t seed, uint64_t stream) {
   uint64_t start = seed;
   uint64_t mixed = splitmix(start) ^ (stream * 0xD1342543DE82EF95u);
-  for (uint64_t& word : state_) word = splitmix(mixed);
+  for (uint64_t& word : state_)
+    word = splitmix(mixed);
 }
 
 uint64_t Random::next() {
@@ -36,7 +39,9 @@ uint64_t Random::next() {
   return result;
 }
 
-double Random::uniform() { return ((next() >> 11) + 1) * (1.0 / 9007199254740992.0); }
+double Random::uniform() {
+  return ((next() >> 11) + 1) * (1.0 / 9007199254740992.0);
+}
 
 double Random::normal() {
   if (has_spare_) {

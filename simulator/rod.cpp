@@ -11,10 +11,9 @@ struct Mode {
   int order;
 };
 
-constexpr Mode kModeTable[kModes] = {{kBendX, 0},  {kBendX, 1},  {kBendX, 2},  {kBendY, 0},
-                                     {kBendY, 1},  {kBendY, 2},  {kTwist, 0},  {kShearX, 0},
-                                     {kShearX, 1}, {kShearY, 0}, {kShearY, 1}, {kAxial, 0},
-                                     {kAxial, 1}};
+constexpr Mode kModeTable[kModes] = {
+    {kBendX, 0},  {kBendX, 1},  {kBendX, 2},  {kBendY, 0},  {kBendY, 1}, {kBendY, 2}, {kTwist, 0},
+    {kShearX, 0}, {kShearX, 1}, {kShearY, 0}, {kShearY, 1}, {kAxial, 0}, {kAxial, 1}};
 
 double legendre(int order, double u) {  // on 0..1
   const double x = 2 * u - 1;
@@ -82,19 +81,22 @@ Rod::Rod(const Rigidity& rigidity, double length_mm)
     // Sampled at the midpoints the polynomials are not quite orthogonal: make
     // them so, then the elastic energy needs no matrix.
     for (int k = 0; k < m; ++k) {
-      if (kModeTable[k].component != kModeTable[m].component) continue;
+      if (kModeTable[k].component != kModeTable[m].component)
+        continue;
       double overlap = 0, square = 0;
       for (int e = 0; e < kElements; ++e) {
         overlap += basis_[e][m] * basis_[e][k];
         square += basis_[e][k] * basis_[e][k];
       }
-      for (int e = 0; e < kElements; ++e) basis_[e][m] -= overlap / square * basis_[e][k];
+      for (int e = 0; e < kElements; ++e)
+        basis_[e][m] -= overlap / square * basis_[e][k];
     }
     double square = 0;
-    for (int e = 0; e < kElements; ++e) square += basis_[e][m] * basis_[e][m];
-    const double scale =
-        1 / std::sqrt(square * element_mm_ * stiffness[kModeTable[m].component]);
-    for (int e = 0; e < kElements; ++e) basis_[e][m] *= scale;
+    for (int e = 0; e < kElements; ++e)
+      square += basis_[e][m] * basis_[e][m];
+    const double scale = 1 / std::sqrt(square * element_mm_ * stiffness[kModeTable[m].component]);
+    for (int e = 0; e < kElements; ++e)
+      basis_[e][m] *= scale;
   }
 }
 

@@ -37,20 +37,22 @@ void Servo::advance_to(int64_t now_us) {
 
 // Full speed far away, first order near by, and no drive in the dead band.
 void Servo::drive(double duration_s) {
-  if (!driven_ || duration_s <= 0) return;
+  if (!driven_ || duration_s <= 0)
+    return;
   const double sign = target_us_ > position_us_ ? 1 : -1;
   double away = std::fabs(target_us_ - position_us_);
-  if (away <= settings_.dead_band_us) return;
-  const double near = std::max(settings_.speed_us_s * settings_.time_constant_s,
-                               settings_.dead_band_us);
+  if (away <= settings_.dead_band_us)
+    return;
+  const double near =
+      std::max(settings_.speed_us_s * settings_.time_constant_s, settings_.dead_band_us);
   if (away > near) {
     const double fast_s = std::min(duration_s, (away - near) / settings_.speed_us_s);
     away -= settings_.speed_us_s * fast_s;
     duration_s -= fast_s;
   }
   if (duration_s > 0) {
-    away = std::max(settings_.dead_band_us,
-                    away * std::exp(-duration_s / settings_.time_constant_s));
+    away =
+        std::max(settings_.dead_band_us, away * std::exp(-duration_s / settings_.time_constant_s));
   }
   position_us_ = target_us_ - sign * away;
 }

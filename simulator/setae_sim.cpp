@@ -56,13 +56,16 @@ bool finite(const double (&values)[3]) {
 }
 
 bool read(const double* from, Vec3& out) {
-  if (from == nullptr) return false;
+  if (from == nullptr)
+    return false;
   const double values[3] = {from[0], from[1], from[2]};
   out = {values[0], values[1], values[2]};
   return finite(values);
 }
 
-bool positive(double value) { return std::isfinite(value) && value > 0; }
+bool positive(double value) {
+  return std::isfinite(value) && value > 0;
+}
 
 void write(const Vec3& from, double* out) {
   out[0] = from.x;
@@ -83,21 +86,27 @@ SETAE_EXPORT setae_world* setae_world_create(uint64_t seed) {
   }
 }
 
-SETAE_EXPORT void setae_world_destroy(setae_world* world) { delete world; }
+SETAE_EXPORT void setae_world_destroy(setae_world* world) {
+  delete world;
+}
 
 SETAE_EXPORT const char* setae_world_error(const setae_world* world) {
   return world->error.c_str();
 }
 
-SETAE_EXPORT int setae_world_parameter_count(void) { return setae::sim::parameter_count(); }
+SETAE_EXPORT int setae_world_parameter_count(void) {
+  return setae::sim::parameter_count();
+}
 
 SETAE_EXPORT const char* setae_world_parameter_name(int index) {
   return setae::sim::parameter_name(index);
 }
 
 SETAE_EXPORT int setae_world_set(setae_world* world, const char* name, double value) {
-  if (world->world) return fail(world, kWrongTime, kStarted);
-  if (name == nullptr) return fail(world, kBadArgument, "a parameter needs a name");
+  if (world->world)
+    return fail(world, kWrongTime, kStarted);
+  if (name == nullptr)
+    return fail(world, kBadArgument, "a parameter needs a name");
   return guarded(world, [&] {
     return setae::sim::set_parameter(world->parameters, name, value, world->error) ? 0
                                                                                    : kBadArgument;
@@ -118,7 +127,8 @@ SETAE_EXPORT int setae_world_get(const setae_world* world, const char* name, dou
 
 SETAE_EXPORT int setae_world_add_tube(setae_world* world, const double axis_point_mm[3],
                                       double inner_radius_mm) {
-  if (world->world) return fail(world, kWrongTime, kStarted);
+  if (world->world)
+    return fail(world, kWrongTime, kStarted);
   Vec3 axis_point;
   if (!read(axis_point_mm, axis_point)) {
     return fail(world, kBadArgument, "the tube's axis_point_mm must be three finite numbers");
@@ -134,7 +144,8 @@ SETAE_EXPORT int setae_world_add_tube(setae_world* world, const double axis_poin
 
 SETAE_EXPORT int setae_world_add_box(setae_world* world, const double centre_mm[3],
                                      const double edges_mm[3], double yaw_rad) {
-  if (world->world) return fail(world, kWrongTime, kStarted);
+  if (world->world)
+    return fail(world, kWrongTime, kStarted);
   Vec3 centre, edges;
   if (!read(centre_mm, centre)) {
     return fail(world, kBadArgument, "the box's centre_mm must be three finite numbers");
@@ -152,13 +163,15 @@ SETAE_EXPORT int setae_world_add_box(setae_world* world, const double centre_mm[
 }
 
 SETAE_EXPORT int setae_world_start(setae_world* world, const double arm_mm[3]) {
-  if (world->world) return fail(world, kWrongTime, kStarted);
+  if (world->world)
+    return fail(world, kWrongTime, kStarted);
   Vec3 arm;
   if (!read(arm_mm, arm)) {
     return fail(world, kBadArgument, "arm_mm must be three finite numbers");
   }
   return guarded(world, [&] {
-    if (!setae::sim::check_parameters(world->parameters, world->error)) return kBadArgument;
+    if (!setae::sim::check_parameters(world->parameters, world->error))
+      return kBadArgument;
     auto started = std::make_unique<World>(world->parameters, world->environment, world->seed, arm);
     if (!started->solved()) {
       return fail(world, kNoSolution, "the spring has no equilibrium with these parameters");
@@ -173,8 +186,10 @@ SETAE_EXPORT int64_t setae_world_now_us(const setae_world* world) {
 }
 
 SETAE_EXPORT int setae_world_send(setae_world* world, const uint8_t* data, size_t size) {
-  if (!world->world) return fail(world, kWrongTime, kNotStarted);
-  if (data == nullptr && size > 0) return fail(world, kBadArgument, "no bytes to send");
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
+  if (data == nullptr && size > 0)
+    return fail(world, kBadArgument, "no bytes to send");
   return guarded(world, [&] {
     world->world->send(data, size);
     return 0;
@@ -183,7 +198,8 @@ SETAE_EXPORT int setae_world_send(setae_world* world, const uint8_t* data, size_
 
 SETAE_EXPORT int setae_world_run(setae_world* world, int64_t until_us, uint8_t* data,
                                  size_t* size) {
-  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
   if (data == nullptr || size == nullptr || *size == 0) {
     return fail(world, kBadArgument, "run needs room for the bytes it returns");
   }
@@ -201,7 +217,8 @@ SETAE_EXPORT int setae_world_run(setae_world* world, int64_t until_us, uint8_t* 
 
 SETAE_EXPORT int setae_world_arm_move(setae_world* world, const double target_mm[3],
                                       double speed_mm_s, double acceleration_mm_s2) {
-  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
   Vec3 target;
   if (!read(target_mm, target)) {
     return fail(world, kBadArgument, "target_mm must be three finite numbers");
@@ -218,7 +235,8 @@ SETAE_EXPORT int setae_world_arm_move(setae_world* world, const double target_mm
 }
 
 SETAE_EXPORT int setae_world_arm_stop(setae_world* world, double acceleration_mm_s2) {
-  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
   if (!positive(acceleration_mm_s2)) {
     return fail(world, kBadArgument, "acceleration_mm_s2 must be positive");
   }
@@ -228,8 +246,10 @@ SETAE_EXPORT int setae_world_arm_stop(setae_world* world, double acceleration_mm
 
 SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
   setae_world* mutable_world = const_cast<setae_world*>(world);  // for the error's text
-  if (!world->world) return fail(mutable_world, kWrongTime, kNotStarted);
-  if (out == nullptr) return fail(mutable_world, kBadArgument, "truth needs a place to go");
+  if (!world->world)
+    return fail(mutable_world, kWrongTime, kNotStarted);
+  if (out == nullptr)
+    return fail(mutable_world, kBadArgument, "truth needs a place to go");
   return guarded(mutable_world, [&] {
     const World& w = *world->world;
     const Truth truth = w.truth();
@@ -243,8 +263,8 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
     out->board_attached = w.hal().attached();
     for (int i = 0; i < SETAE_TENDONS; ++i) {
       if (w.hal().attached() >> i & 1) {
-        out->pulse_us[i] = static_cast<double>(w.hal().output().ticks[i]) /
-                           setae::protocol::kPulseTicksPerUs;
+        out->pulse_us[i] =
+            static_cast<double>(w.hal().output().ticks[i]) / setae::protocol::kPulseTicksPerUs;
       }
       out->servo_length_mm[i] = truth.body.servos[i].length_mm();
       out->tension_n[i] = plant.tension_n()[i];
@@ -272,7 +292,8 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
 }
 
 SETAE_EXPORT int setae_world_sensor_fault(setae_world* world, int fault) {
-  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
   if (fault < 0 || fault > 3) {
     return fail(world, kBadArgument, "a sensor fault is 0 (none), 1, 2 or 3");
   }
@@ -281,7 +302,8 @@ SETAE_EXPORT int setae_world_sensor_fault(setae_world* world, int fault) {
 }
 
 SETAE_EXPORT int setae_world_reset_board(setae_world* world) {
-  if (!world->world) return fail(world, kWrongTime, kNotStarted);
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
   return guarded(world, [&] {
     world->world->reset_board();
     return 0;

@@ -23,20 +23,20 @@ typedef struct setae_world setae_world;
 
 typedef struct {
   int64_t time_us;
-  double arm_mm[3];          /* origin of frame D in the world */
+  double arm_mm[3]; /* origin of frame D in the world */
   double arm_target_mm[3];
   int32_t arm_moving;
-  int32_t board_attached;    /* bit i: servo i has pulses */
+  int32_t board_attached;                /* bit i: servo i has pulses */
   double pulse_us[SETAE_TENDONS];        /* what the board puts out; 0 where detached */
   double servo_length_mm[SETAE_TENDONS]; /* free tendon length that the servo leaves, true */
   double tension_n[SETAE_TENDONS];
   double backbone_mm[SETAE_BACKBONE_POINTS][3]; /* frame D, from D to U */
-  double rotation[9];        /* D to U, row major */
-  double filament_mm[2][3];  /* frame D: root and undeformed tip E */
-  double contact_depth_mm;   /* deepest penetration of the undeformed filament */
-  double contact_point_mm[3];/* where, in the world; valid if contact_depth_mm > 0 */
-  double pressure_hpa;       /* true pressure at the sensor, noise included */
-  double plant_residual;     /* scaled gradient norm of the last equilibrium */
+  double rotation[9];                           /* D to U, row major */
+  double filament_mm[2][3];                     /* frame D: root and undeformed tip E */
+  double contact_depth_mm;                      /* deepest penetration of the undeformed filament */
+  double contact_point_mm[3]; /* where, in the world; valid if contact_depth_mm > 0 */
+  double pressure_hpa;        /* true pressure at the sensor, noise included */
+  double plant_residual;      /* scaled gradient norm of the last equilibrium */
 } setae_truth;
 
 /* A world with every parameter at its default; nothing runs yet. */
@@ -53,7 +53,8 @@ int setae_world_get(const setae_world*, const char* name, double* value);
 /* Solids that the bristle can touch, in the world; before the start only. */
 int setae_world_add_tube(setae_world*, const double axis_point_mm[3], double inner_radius_mm);
 /* Box: centre, edge lengths, turned by yaw about the world's z axis. */
-int setae_world_add_box(setae_world*, const double centre_mm[3], const double edges_mm[3], double yaw_rad);
+int setae_world_add_box(setae_world*, const double centre_mm[3], const double edges_mm[3],
+                        double yaw_rad);
 
 int setae_world_start(setae_world*, const double arm_mm[3]);
 
@@ -67,7 +68,8 @@ int setae_world_send(setae_world*, const uint8_t* data, size_t size);
 int setae_world_run(setae_world*, int64_t until_us, uint8_t* data, size_t* size);
 
 /* Linear move of the arm with a trapezoidal speed profile; starts now. */
-int setae_world_arm_move(setae_world*, const double target_mm[3], double speed_mm_s, double acceleration_mm_s2);
+int setae_world_arm_move(setae_world*, const double target_mm[3], double speed_mm_s,
+                         double acceleration_mm_s2);
 int setae_world_arm_stop(setae_world*, double acceleration_mm_s2);
 
 int setae_world_truth(const setae_world*, setae_truth* out);

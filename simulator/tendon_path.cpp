@@ -27,10 +27,12 @@ void TendonPath::solve(const Shape& shape, const Vec3& base, const Vec3& top,
   const bool was_bent = touches_;
   converged_ = true;
   touches_ = false;
-  for (auto& wrench : wrenches_) wrench = {{0, 0, 0}, {0, 0, 0}};
+  for (auto& wrench : wrenches_)
+    wrench = {{0, 0, 0}, {0, 0, 0}};
   const auto kept = crossing_;
   if (!straight(shape, bore_radius_mm)) {
-    if (was_bent) crossing_ = kept;
+    if (was_bent)
+      crossing_ = kept;
     bend(shape, bore_radius_mm);
   }
   // The top hole feels the last piece's direction in both cases.
@@ -90,7 +92,8 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
     }
     for (int j = 1; j <= kInner; ++j) {
       const double over = std::hypot(crossing_[j].u, crossing_[j].v) - bore_radius_mm;
-      if (over > 0) length_mm_ += 0.5 * kBoreStiffness * over * over;
+      if (over > 0)
+        length_mm_ += 0.5 * kBoreStiffness * over * over;
     }
     if (have_step) {
       if (length_mm_ > base_length - 1e-4 * fraction * slope + 1e-11 && fraction > 1e-6) {
@@ -100,7 +103,8 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
         }
         continue;
       }
-      if (converged_) break;
+      if (converged_)
+        break;
     }
 
     std::array<Crossing, kStations> gradient;
@@ -169,7 +173,8 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
       step[j] = {(d.d * ru - d.b * rv) * scale, (d.a * rv - d.c * ru) * scale};
       longest = std::max(longest, std::max(std::fabs(step[j].u), std::fabs(step[j].v)));
     }
-    for (int j = 1; j <= kInner; ++j) slope += gradient[j].u * step[j].u + gradient[j].v * step[j].v;
+    for (int j = 1; j <= kInner; ++j)
+      slope += gradient[j].u * step[j].u + gradient[j].v * step[j].v;
     fraction = longest > kLongestStep_mm ? kLongestStep_mm / longest : 1;
     base = crossing_;
     base_length = length_mm_;

@@ -30,7 +30,8 @@ PlantSettings plant_settings(const Parameters& p) {
   s.gravity_m_s2 = p.plant.gravity_m_s2;
   s.tendon_stiffness_n_per_mm = p.tendon.stiffness_n_per_mm;
   s.tendon_radius_mm = p.tendon.radius_mm;
-  for (int i = 0; i < kTendons; ++i) s.tendon_angle_rad[i] = kDegree * p.tendon.angle_deg[i];
+  for (int i = 0; i < kTendons; ++i)
+    s.tendon_angle_rad[i] = kDegree * p.tendon.angle_deg[i];
   return s;
 }
 
@@ -99,7 +100,8 @@ World::World(const Parameters& parameters, const Environment& environment, uint6
   Vec3 root_mm, tip_mm;
   filament(body_, root_mm, tip_mm);
   bristle_.place(in_world(root_mm));
-  if (parameters.board.pose_known == 0) hal_.forget_pose();
+  if (parameters.board.pose_known == 0)
+    hal_.forget_pose();
   boot();
 }
 
@@ -109,22 +111,26 @@ bool World::run(int64_t until_us) {
     // slices the time.
     const int64_t next_us = next_event_us();
     now_us_ = std::min(next_us, until_us);
-    if (next_us <= now_us_) handle_events();
-    if (unsolved_ >= kUnsolvedMost) return false;
+    if (next_us <= now_us_)
+      handle_events();
+    if (unsolved_ >= kUnsolvedMost)
+      return false;
   }
   return true;
 }
 
 int64_t World::next_event_us() const {
-  int64_t next_us = std::min({next_sample_us_, line_.next_arrival_us(),
-                              line_.next_transmitted_us(), line_.next_flush_us()});
-  if (!board_) return std::min(next_us, boot_us_);
+  int64_t next_us = std::min({next_sample_us_, line_.next_arrival_us(), line_.next_transmitted_us(),
+                              line_.next_flush_us()});
+  if (!board_)
+    return std::min(next_us, boot_us_);
   return std::min({next_us, next_frame_us_, next_poll_us_});
 }
 
 void World::handle_events() {
   bool poll = boot();
-  if (board_) hal_.advance_to(static_cast<uint64_t>(board_us(now_us_)));
+  if (board_)
+    hal_.advance_to(static_cast<uint64_t>(board_us(now_us_)));
   poll |= start_frame();
   poll |= sample();
   poll |= receive();
@@ -136,9 +142,11 @@ void World::handle_events() {
     next_poll_us_ += std::llround(parameters_.board.poll_us);
     poll = true;
   }
-  if (board_ && poll) board_->poll();
+  if (board_ && poll)
+    board_->poll();
   transmit();
-  if (line_.next_flush_us() <= now_us_) line_.flush();
+  if (line_.next_flush_us() <= now_us_)
+    line_.flush();
 }
 
 int64_t World::board_us(int64_t world_us) const {
@@ -149,13 +157,16 @@ int64_t World::board_us(int64_t world_us) const {
 int64_t World::world_us(int64_t board_us_wanted) const {
   int64_t time_us = boot_us_ + static_cast<int64_t>(static_cast<double>(board_us_wanted) /
                                                     (1 + 1e-9 * clock_error_ppb_));
-  while (board_us(time_us) >= board_us_wanted) --time_us;
-  while (board_us(time_us) < board_us_wanted) ++time_us;
+  while (board_us(time_us) >= board_us_wanted)
+    --time_us;
+  while (board_us(time_us) < board_us_wanted)
+    ++time_us;
   return time_us;
 }
 
 bool World::boot() {
-  if (board_ || now_us_ < boot_us_) return false;
+  if (board_ || now_us_ < boot_us_)
+    return false;
   board_ = std::make_unique<Board>(hal_);
   frame_ = 1;
   next_frame_us_ = world_us(protocol::kServoFrameUs);
@@ -177,7 +188,8 @@ void World::reset_board() {
 }
 
 bool World::start_frame() {
-  if (!board_ || next_frame_us_ > now_us_) return false;
+  if (!board_ || next_frame_us_ > now_us_)
+    return false;
   for (int i = 0; i < kTendons; ++i) {
     Servo& servo = body_.servos[i];
     servo.advance_to(now_us_);
@@ -199,7 +211,8 @@ bool World::receive() {
   bool received = false;
   while (line_.next_arrival_us() <= now_us_) {
     const uint8_t byte = line_.take_arrival();
-    if (!board_) continue;  // nobody listens while it boots
+    if (!board_)
+      continue;  // nobody listens while it boots
     hal_.push_rx(byte);
     received = true;
   }
@@ -208,11 +221,13 @@ bool World::receive() {
 
 void World::transmit() {
   uint8_t byte;
-  if (board_ && line_.transmitter_free() && hal_.pop_tx(byte)) line_.transmit(now_us_, byte);
+  if (board_ && line_.transmitter_free() && hal_.pop_tx(byte))
+    line_.transmit(now_us_, byte);
 }
 
 bool World::sample() {
-  if (next_sample_us_ > now_us_) return false;
+  if (next_sample_us_ > now_us_)
+    return false;
   const int64_t duration_us = now_us_ - last_sample_us_;
   move(body_, duration_us);
   unsolved_ = body_.plant.solved() ? 0 : unsolved_ + 1;
@@ -226,14 +241,15 @@ bool World::sample() {
   ++samples_;
   next_sample_us_ = sample_time_us(parameters_, samples_ + 1);
 
-  if (!board_) return false;
+  if (!board_)
+    return false;
   const uint64_t sampled_us = hal_.board_us();
   switch (sensor_fault_) {
     case SensorFault::kNone:
-      hal_.push_sample(protocol::Sensor::kOk,
-                       static_cast<int32_t>(std::lround(protocol::kPressureLsbPerHpa *
-                                                        pressure_hpa())),
-                       sampled_us);
+      hal_.push_sample(
+          protocol::Sensor::kOk,
+          static_cast<int32_t>(std::lround(protocol::kPressureLsbPerHpa * pressure_hpa())),
+          sampled_us);
       break;
     case SensorFault::kAbsent:
       hal_.push_sample(protocol::Sensor::kAbsent, 0, sampled_us);
@@ -254,7 +270,8 @@ void World::move(Body& body, int64_t duration_us) const {
     body.servos[i].advance_to(now_us_);
     lengths_mm[i] = body.servos[i].length_mm();
   }
-  if (duration_us <= 0) return;
+  if (duration_us <= 0)
+    return;
   if (lengths_mm == body.plant.lengths_mm() && !body.plant.creeping() && body.plant.solved()) {
     return;
   }
