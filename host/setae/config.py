@@ -495,6 +495,25 @@ class Config:
     tube: Tube
     simulator: tuple[tuple[str, float], ...] = ()
 
+    def __post_init__(self) -> None:
+        count = self.geometry.tendon_count
+        if count != SERVOS:
+            raise ConfigError(
+                f"[geometry] tendon_angles_deg has {count} entries.",
+                f"The board drives {SERVOS} servos: give {SERVOS}. "
+                "`Geometry` alone takes any number.",
+            )
+        length, low, high = (
+            self.explore.compressed_length_mm,
+            self.geometry.min_length_mm,
+            self.geometry.free_length_mm,
+        )
+        if not low <= length <= high:
+            raise ConfigError(
+                f"[explore] compressed_length_mm = {length:g} must lie from "
+                f"min_length_mm = {low:g} to free_length_mm = {high:g}."
+            )
+
     def to_toml(self) -> str:
         """The whole configuration as TOML, for logs: `loads` reads it back."""
         lines: list[str] = []
@@ -586,7 +605,10 @@ def loads(text: str, *, source: str = "configuration") -> Config:
         except ConfigError as error:
             raise ConfigError(f"{source}: {error.problem}") from None
     parameters = {**paper.get("simulator", {}), **theirs.get("simulator", {})}
-    return Config(**sections, simulator=tuple(sorted(parameters.items())))
+    try:
+        return Config(**sections, simulator=tuple(sorted(parameters.items())))
+    except ConfigError as error:
+        raise ConfigError(f"{source}: {error.problem}", error.remedy) from None
 
 
 def _parse(text: str, source: str) -> dict[str, dict[str, Any]]:

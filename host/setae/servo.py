@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -225,6 +226,7 @@ def segment_messages(
     return tuple(result)
 
 
+@lru_cache(maxsize=8)
 def board_limits(config: Config, *, margin_mm: float = 1.0) -> messages.SetLimits:
     """Derive the limits that the board checks by itself.
 
@@ -327,8 +329,6 @@ def _workspace_lengths_mm(config: Config) -> FloatArray:
         indexing="ij",
     )
     arc = Arc.from_angles(length_mm=length, theta_rad=theta, alpha_rad=alpha)
-    parts = []
-    for model in TENDON_MODELS:
-        reach = workspace.check(arc, config, model)
-        parts.append(reach.lengths_mm[reach.reachable])
-    return np.concatenate(parts)
+    return np.concatenate(
+        [workspace.reachable_lengths_mm(arc, config, model) for model in TENDON_MODELS]
+    )

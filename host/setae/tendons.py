@@ -261,8 +261,9 @@ def _paper_fit(q: FloatArray, geometry: Geometry, hint: Hint | None) -> Arc:
 
     The rule is smooth while no tendon changes sides, so the direction α is cut
     where one does. Each piece is fitted three times: free, and held to each of its
-    ends, just inside; and the ends themselves, where tendons lie on the boundary,
-    are pieces of their own. The candidate whose true lengths come closest wins.
+    ends, just inside. The ends, where tendons lie on the boundary, are narrow pieces
+    of their own, fitted free and held. The candidate whose true lengths come closest
+    wins.
     """
     shape = q.shape[:-1]
     q = q.reshape(-1, geometry.tendon_count)
@@ -392,15 +393,18 @@ def _paper_pieces(geometry: Geometry) -> tuple[BoolArray, FloatArray, BoolArray]
         cosine = np.cos(angles - alpha[:, np.newaxis])
         return np.asarray(cosine > BOUNDARY_TOLERANCE)
 
-    middle = sides(starts + widths / 2)
-    alphas = (starts, starts + nudge, ends - nudge)
-    inner = np.concatenate([middle, sides(starts), middle, middle])
-    basis = np.concatenate(
-        [np.broadcast_to(np.eye(2), (len(starts), 2, 2)), *(held(alpha) for alpha in alphas)]
+    whole = np.broadcast_to(np.eye(2), (len(starts), 2, 2))
+    middle, edge = sides(starts + widths / 2), sides(starts)
+    candidates = (
+        (middle, whole),
+        (edge, whole),
+        (edge, held(starts)),
+        (middle, held(starts + nudge)),
+        (middle, held(ends - nudge)),
     )
-    free = np.zeros(len(inner), dtype=bool)
-    free[: len(starts)] = True
-    return inner, basis, free
+    inner = np.concatenate([inner for inner, _ in candidates])
+    basis = np.concatenate([basis for _, basis in candidates])
+    return inner, basis, np.asarray(basis[:, 1, 1] == 1.0)
 
 
 MODELS: Mapping[str, TendonModel] = MappingProxyType(

@@ -334,7 +334,7 @@ def duration_for_speed(
     Returns
     -------
     float
-        Seconds; 0.0 where the tip doesn't move.
+        Seconds; at least one servo frame.
 
     Examples
     --------
@@ -350,7 +350,7 @@ def duration_for_speed(
     slope = np.linalg.norm(np.gradient(tip, part, axis=0, edge_order=2), axis=-1)
     # |dE/dt| = |dE/ds| · s'(t/T) / T; at time t the phase is quintic(t/T).
     peak = np.interp(quintic(part), part, slope) * _quintic_rate(part)
-    return float(peak.max()) / speed
+    return max(float(peak.max()) / speed, FRAME_S)
 
 
 # ----------------------------------------------------------------------- planning

@@ -21,7 +21,15 @@ from setae.arc import Arc, FloatArray
 from setae.config import Config, Geometry
 from setae.errors import UnreachableError
 
-__all__ = ["Reach", "Reason", "check", "require", "servo_range_mm", "tensions_n"]
+__all__ = [
+    "Reach",
+    "Reason",
+    "check",
+    "reachable_lengths_mm",
+    "require",
+    "servo_range_mm",
+    "tensions_n",
+]
 
 TOLERANCE = 1e-6
 """Of lengths in mm and angles in rad: a target on the border counts as inside, in float32 too."""
@@ -185,24 +193,37 @@ def check(arc: Arc, config: Config, model: str | None = None) -> Reach:
     >>> reach.explain(1)[0]
     'The spring would be 75.00 mm long, and it is 70 mm long when free.'
     """
-    geometry = config.geometry
-    q = tendons.model(model or config.motion.model).lengths(arc, geometry)
+    q, reasons = _reach(arc, config, model or config.motion.model)
     tensions = tensions_n(arc, config)
-    low, high = _tendon_range_mm(config)
+    reasons |= np.where(np.isnan(tensions).any(axis=-1), int(Reason.NEEDS_PUSH), 0)
     with np.errstate(invalid="ignore"):
-        findings = {
-            Reason.TOO_SHORT: arc.length_mm < geometry.min_length_mm - TOLERANCE,
-            Reason.TOO_LONG: arc.length_mm > geometry.free_length_mm + TOLERANCE,
-            Reason.OVER_BENT: arc.theta_rad > geometry.max_bend_rad + TOLERANCE,
-            Reason.TENDON_TOO_SHORT: (q < low - TOLERANCE).any(axis=-1),
-            Reason.TENDON_TOO_LONG: (q > high + TOLERANCE).any(axis=-1),
-            Reason.NEEDS_PUSH: np.isnan(tensions).any(axis=-1),
-            Reason.TOO_TENSE: (tensions > config.servo.max_tension_n).any(axis=-1),
-        }
+        tense = (tensions > config.servo.max_tension_n).any(axis=-1)
+    reasons |= np.where(tense, int(Reason.TOO_TENSE), 0)
+    return Reach(arc, q, tensions, reasons, config)
+
+
+def reachable_lengths_mm(arc: Arc, config: Config, model: str) -> FloatArray:
+    """Compute the tendon lengths of those poses that are reachable, shape (p, n)."""
+    q, reasons = _reach(arc, config, model)
+    return np.asarray(q[reasons == 0])
+
+
+def _reach(arc: Arc, config: Config, model: str) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Tendon lengths, and the reasons that concern reaching."""
+    geometry = config.geometry
+    q = tendons.model(model).lengths(arc, geometry)
+    low, high = _tendon_range_mm(config)
+    findings = {
+        Reason.TOO_SHORT: arc.length_mm < geometry.min_length_mm - TOLERANCE,
+        Reason.TOO_LONG: arc.length_mm > geometry.free_length_mm + TOLERANCE,
+        Reason.OVER_BENT: arc.theta_rad > geometry.max_bend_rad + TOLERANCE,
+        Reason.TENDON_TOO_SHORT: (q < low - TOLERANCE).any(axis=-1),
+        Reason.TENDON_TOO_LONG: (q > high + TOLERANCE).any(axis=-1),
+    }
     reasons = np.zeros(arc.shape, dtype=np.int64)
     for reason, found in findings.items():
         reasons |= np.where(found, int(reason), 0)
-    return Reach(arc, q, tensions, reasons, config)
+    return q, reasons
 
 
 def require(

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
+
 from setae import kinematics, tendons
 from setae.arc import Arc
 from setae.config import TENDON_MODELS, Geometry
@@ -39,6 +40,9 @@ def test_position_and_inverse_are_each_others_inverse(
 
 @pytest.mark.parametrize("model", TENDON_MODELS)
 @given(length=lengths, theta=thetas, alpha=alphas)
+@example(length=20.0, theta=1.0, alpha=4.5e-7)  # inside the boundary's tolerance
+@example(length=20.0, theta=1.0, alpha=2e-6)  # just outside
+@example(length=20.0, theta=1.0, alpha=-2e-6)
 def test_forward_finds_the_arc_that_made_the_lengths(
     model: str, length: float, theta: float, alpha: float
 ) -> None:
@@ -125,7 +129,7 @@ def test_paper_fit_survives_rounding_to_ticks_when_it_knows_where_to_look() -> N
     arc = Arc.from_angles(
         length_mm=68.8074467518179, theta_rad=1.2414373615598033, alpha_rad=math.radians(9.59219)
     )
-    q = tendons.lengths(arc, GEOMETRY, "paper") + [-0.007, 0.05, 0.002, 0.019]
+    q = tendons.lengths(arc, GEOMETRY, "paper") + np.array([-0.007, 0.05, 0.002, 0.019])
     lost = kinematics.forward(q, GEOMETRY, "paper")
     assert np.linalg.norm(lost.top_mm - arc.top_mm) > 15
     assert np.abs(tendons.lengths(lost, GEOMETRY, "paper") - q).max() < 0.1

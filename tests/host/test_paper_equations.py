@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from setae import kinematics, tendons
 from setae.arc import Arc, FloatArray
 from setae.config import Geometry
@@ -50,19 +51,19 @@ def shift(x: float = 0.0, z: float = 0.0) -> FloatArray:
 
 
 def equation_3(theta: float, alpha: float, r: float) -> FloatArray:
-    ca, sa, ct, st_ = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
+    ca, sa, ct, sn = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
     return np.array(
         [
-            [ca**2 * ct + sa**2, sa * ca * ct - sa * ca, ca * st_, -r * ca * ct + r * ca],
-            [sa * ca * ct - sa * ca, sa**2 * ct + ca**2, sa * st_, -r * sa * ct + r * sa],
-            [-ca * st_, -sa * st_, ct, r * st_],
+            [ca**2 * ct + sa**2, sa * ca * ct - sa * ca, ca * sn, -r * ca * ct + r * ca],
+            [sa * ca * ct - sa * ca, sa**2 * ct + ca**2, sa * sn, -r * sa * ct + r * sa],
+            [-ca * sn, -sa * sn, ct, r * sn],
             [0, 0, 0, 1],
         ]
     )
 
 
 @given(lengths, thetas, alphas)
-def test_equations_1_to_3_transform_from_base_to_top(
+def tesnequations_1_to_3_transform_from_base_to_top(
     length: float, theta: float, alpha: float
 ) -> None:
     arc, r = arc_of(length, theta, alpha)
@@ -73,7 +74,7 @@ def test_equations_1_to_3_transform_from_base_to_top(
 
 
 @given(lengths, thetas, alphas)
-def test_equation_4_position_of_the_top(length: float, theta: float, alpha: float) -> None:
+def tesnequation_4_position_of_the_top(length: float, theta: float, alpha: float) -> None:
     arc, r = arc_of(length, theta, alpha)
     close(
         kinematics.position(arc),
@@ -86,7 +87,7 @@ def test_equation_4_position_of_the_top(length: float, theta: float, alpha: floa
 
 
 @given(lengths, thetas, alphas)
-def test_equations_5_to_7_inverse(length: float, theta: float, alpha: float) -> None:
+def tesnequations_5_to_7_inverse(length: float, theta: float, alpha: float) -> None:
     _, r = arc_of(length, theta, alpha)
     x, y, z, _ = equation_3(theta, alpha, r)[:, 3]
     arc = kinematics.inverse((x, y, z))
@@ -100,7 +101,7 @@ def test_equations_5_to_7_inverse(length: float, theta: float, alpha: float) -> 
 
 
 @given(lengths, thetas, alphas, tip_offsets)
-def test_equations_8_to_10_tip(length: float, theta: float, alpha: float, offset: float) -> None:
+def tesnequations_8_to_10_tip(length: float, theta: float, alpha: float, offset: float) -> None:
     arc, r = arc_of(length, theta, alpha)
     d_t_u = equation_3(theta, alpha, r)
     close(kinematics.transform(arc, tip_offset_mm=offset), d_t_u @ shift(z=offset))  # 8, 9
@@ -115,23 +116,26 @@ def test_equations_8_to_10_tip(length: float, theta: float, alpha: float, offset
 
 def attachments(theta: float, alpha: float, r: float) -> tuple[FloatArray, FloatArray]:
     """Equation 11 and the one after it: lower and upper ends of the tendons, (4, 3)."""
-    ca, sa, ct, st_ = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
+    ca, sa, ct, sn = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
     x, y, z, _ = equation_3(theta, alpha, r)[:, 3]
     d = D
     low = np.array([(d, 0, 0), (0, d, 0), (-d, 0, 0), (0, -d, 0)])
+    # The terms that the four have in common.
+    xx, yy = d * ca**2 * ct + d * sa**2, d * sa**2 * ct + d * ca**2
+    xy = d * sa * ca * ct - d * sa * ca
     high = np.array(
         [
-            (d * ca**2 * ct + d * sa**2 + x, d * sa * ca * ct - d * sa * ca + y, -d * ca * st_ + z),
-            (d * sa * ca * ct - d * sa * ca + x, d * sa**2 * ct + d * ca**2 + y, -d * sa * st_ + z),
-            (-d * ca**2 * ct - d * sa**2 + x, -d * sa * ca * ct + d * sa * ca + y, d * ca * st_ + z),
-            (-d * sa * ca * ct + d * sa * ca + x, -d * sa**2 * ct - d * ca**2 + y, d * sa * st_ + z),
+            (xx + x, xy + y, -d * ca * sn + z),
+            (xy + x, yy + y, -d * sa * sn + z),
+            (-xx + x, -xy + y, d * ca * sn + z),
+            (-xy + x, -yy + y, d * sa * sn + z),
         ]
-    )  # fmt: skip
+    )
     return low, high
 
 
 @given(lengths, thetas, alphas)
-def test_equation_11_attachments_move_with_the_top(
+def tesnequation_11_attachments_move_with_the_top(
     length: float, theta: float, alpha: float
 ) -> None:
     arc, r = arc_of(length, theta, alpha)
@@ -141,7 +145,7 @@ def test_equation_11_attachments_move_with_the_top(
 
 
 @given(lengths, thetas, alphas)
-def test_equation_12_tendon_lengths(length: float, theta: float, alpha: float) -> None:
+def tesnequation_12_tendon_lengths(length: float, theta: float, alpha: float) -> None:
     arc, r = arc_of(length, theta, alpha)
     low, high = attachments(theta, alpha, r)
     centre = np.array([r * math.cos(alpha), r * math.sin(alpha), 0])

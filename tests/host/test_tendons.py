@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
+
 from setae import kinematics, tendons
-from setae.arc import Arc
+from setae.arc import Arc, FloatArray
 from setae.config import TENDON_MODELS, Geometry
 from setae.errors import InputError
 
@@ -78,8 +79,8 @@ def test_the_jump_has_the_size_that_the_documentation_says() -> None:
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_tendons_on_the_boundary_are_chords_whatever_rounding_says(dtype: type) -> None:
-    # x = ρ cos α, as an experiment would compute it: rounding puts 7 of the 272 tendons on
-    # the boundary to the inner side.
+    # x = ρ cos α, as an experiment would compute it: with equation 12 as printed, rounding puts
+    # some of the 272 tendons on the boundary to the inner side.
     z, theta, alpha = np.meshgrid(
         np.arange(40.0, 71, 5),
         np.radians(np.arange(10, 91, 10)),
@@ -87,7 +88,9 @@ def test_tendons_on_the_boundary_are_chords_whatever_rounding_says(dtype: type) 
         indexing="ij",
     )
     rho = z * np.tan(theta / 2)
-    targets = np.stack([rho * np.cos(alpha), rho * np.sin(alpha), z], axis=-1).astype(dtype)
+    targets: FloatArray = np.stack([rho * np.cos(alpha), rho * np.sin(alpha), z], axis=-1).astype(
+        dtype
+    )
     arc = kinematics.inverse(targets)
     q = tendons.lengths(arc, GEOMETRY, "paper")
     chord = arc.length_mm * np.sin(arc.theta_rad / 2) / (arc.theta_rad / 2)
