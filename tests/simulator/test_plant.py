@@ -11,7 +11,7 @@ import pytest
 if TYPE_CHECKING:
     from tests.simulator.conftest import Driver, MakeDriver
 
-from setae.sim import Truth
+from setae.sim import SimulationError, Truth
 
 SOLVED = 1e-4
 
@@ -142,3 +142,12 @@ def test_the_arc_s_tendon_lengths_come_near_the_tube_s_targets(driver: Driver) -
         error_mm = float(np.linalg.norm(tip(driver.reach(target)) - target))
         assert 0.1 < error_mm < (1.0 if direction % 2 == 0 else 2.0)
         driver.pull(45.0)
+
+
+def test_a_spring_without_a_solution_is_an_error(make_driver: MakeDriver) -> None:
+    """A bore far wider than the bend: strings cross the coils, and nothing settles."""
+    driver = make_driver({"spring.bore_radius_mm": 100.0})
+    rng = np.random.default_rng(1)
+    with pytest.raises(SimulationError, match="equilibrium"):
+        for _ in range(30):
+            driver.pull(rng.uniform(5, 75, 4), duration_s=0.6, rest_s=0.1)
