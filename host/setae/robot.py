@@ -306,7 +306,6 @@ class Robot:
 
     def resume(self) -> None:
         """Leave stopped, tripped or fault; a running reflex is waited for."""
-        self._told("resume")
         if self.state in (State.RELAXED, State.HOLDING):
             return
         if self.state is State.TRIPPED:
@@ -316,6 +315,7 @@ class Robot:
                 "the reflex to end",
                 watch=False,
             )
+        self._told("resume")
         self._trip = self._fault = None
         self._request(Resume(epoch=self.session.epoch), watch=False)
         self._wait(

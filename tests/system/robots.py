@@ -21,6 +21,13 @@ from setae.sim import SimTransport, SimulatedStage, World
 WALL_AHEAD = Obstacle(below_tip_mm=1.0)
 
 
+def run_world(world: World, duration_s: float) -> None:
+    """Let time pass with no host listening."""
+    end_us = world.now_us + round(duration_s * 1e6)
+    while world.now_us < end_us:
+        world.run(end_us)
+
+
 @dataclass
 class Bench:
     """A robot and all that a test may look at or meddle with."""

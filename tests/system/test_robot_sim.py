@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.system.robots import WALL_AHEAD, Bench, bench, compressed
+from tests.system.robots import WALL_AHEAD, Bench, bench, compressed, run_world
 
 from setae.errors import (
     BoardResetError,
@@ -250,7 +250,7 @@ def test_a_dead_line_is_told_and_the_board_plays_its_queue_to_the_end_and_holds(
         with pytest.raises(LinkLostError, match="cable"):
             made.robot.move_to((0.0, 0.0, 65.0), duration_s=3.0)
         held = made.pulses_us()
-        made.world.run(made.world.now_us + 2_000_000)
+        run_world(made.world, 2)
         assert made.pulses_us() == pytest.approx(held)
         assert made.world.truth().attached == (True,) * 4
 
@@ -260,7 +260,7 @@ def test_a_board_that_resets_in_mid_move_is_noticed_and_never_goes_on() -> None:
         made.at(made.robot.now_us + 300_000, made.world.reset_board)
         with pytest.raises(BoardResetError):
             made.robot.move_to((0.0, 0.0, 65.0), duration_s=3.0)
-        made.world.run(made.world.now_us + 2_000_000)
+        run_world(made.world, 2)
         assert made.world.truth().attached == (False,) * 4
 
 
@@ -268,7 +268,7 @@ def test_leaving_the_with_block_relaxes() -> None:
     with compressed() as made:
         with made.robot:
             pass
-        made.world.run(made.world.now_us + 40_000)
+        run_world(made.world, 0.04)
         assert made.world.truth().attached == (False,) * 4
         assert made.world.truth().backbone_mm[-1, 2] > 65.0
 
@@ -279,7 +279,7 @@ def test_an_error_in_the_with_block_stops_and_holds() -> None:
         with pytest.raises(KeyboardInterrupt), made.robot as robot:
             robot.move_to(TARGET_MM, duration_s=2.0)
         held = made.pulses_us()
-        made.world.run(made.world.now_us + 2_000_000)
+        run_world(made.world, 2)
         assert made.pulses_us() == pytest.approx(held)
         assert made.robot.state is State.STOPPED
         assert made.world.truth().attached == (True,) * 4

@@ -21,6 +21,7 @@ app = App(
     name="setae",
     help="Drive, probe and simulate a tendon-driven continuum robot with a bristle.",
     version=setae.__version__,
+    suppress_keyboard_interrupt=False,  # main() says what became of the robot
 )
 
 console = Console(highlight=False)
