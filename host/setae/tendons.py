@@ -213,31 +213,38 @@ def _inner(arc: Arc, geometry: Geometry) -> BoolArray:
 
 
 def _paper_lengths(arc: Arc, geometry: Geometry) -> FloatArray:
-    return _paper_rule(
-        arc.length_mm, arc.bend_rad, _inner(arc, geometry), geometry.tendon_radius_mm,
+    return _paper_cases(
+        arc.length_mm,
+        arc.bend_rad,
+        _inner(arc, geometry),
+        geometry.tendon_radius_mm,
         _directions(geometry),
-    )[0]  # fmt: skip
+    )
 
 
-def _paper_rule(
+def _paper_cases(
     length: FloatArray, bend: FloatArray, inner: BoolArray, d: float, u: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Equation 12 with the case of each tendon given.
+) -> FloatArray:
+    """Equation 12 with the case of each tendon given, shape (..., n).
 
-    With r = L/θ its two cases are ‖P_L − C‖·θ = √(L² + d²θ² − 2 L d Δ·u) and
+    With r = L/θ the two cases are ‖P_L − C‖·θ = √((L − d Δ·u)² + d²|Δ×u|²) and
     ‖P_L − P_H‖ = (L − d Δ·u)·sinc(θ/2): no radius, so no singularity.
-
-    Returns the lengths (..., n) and their derivatives by (L, Δ), (..., n, 3).
     """
-    length = length[..., np.newaxis]
+    parallel = length[..., np.newaxis] - d * (bend @ u.T)
+    across = d * (bend @ np.stack([-u[:, 1], u[:, 0]]))
     half = np.hypot(bend[..., 0], bend[..., 1])[..., np.newaxis] / 2
-    parallel = length - d * (bend @ u.T)
-    # As a sum of squares: exact where both terms are small.
+    return np.asarray(np.where(inner, np.hypot(parallel, across), parallel * sinc(half)))
+
+
+def _paper_derivative(
+    length: FloatArray, bend: FloatArray, inner: BoolArray, d: float, u: FloatArray
+) -> FloatArray:
+    """Derivatives of `_paper_cases` by (L, Δ), shape (..., n, 3)."""
+    parallel = length[..., np.newaxis] - d * (bend @ u.T)
     across = d * (bend @ np.stack([-u[:, 1], u[:, 0]]))
     arc = np.hypot(parallel, across)
+    half = np.hypot(bend[..., 0], bend[..., 1])[..., np.newaxis] / 2
     shrink = sinc(half)
-    chord = parallel * shrink
-
     with np.errstate(divide="ignore", invalid="ignore"):
         # d sinc(θ/2) / dΔ = slope·Δ; the quotient loses its digits near 0, the series doesn't.
         slope = np.where(
@@ -246,14 +253,13 @@ def _paper_rule(
             (np.cos(half) - shrink) / (4 * half**2),
         )
         by_length = np.where(inner, parallel / arc, shrink)
-    bend_ = bend[..., np.newaxis, :]
+    bend = bend[..., np.newaxis, :]
     by_bend = np.where(
         inner[..., np.newaxis],
-        (d * d * bend_ - d * length[..., np.newaxis] * u) / arc[..., np.newaxis],
-        -d * u * shrink[..., np.newaxis] + (parallel * slope)[..., np.newaxis] * bend_,
+        (d * d * bend - d * length[..., np.newaxis, np.newaxis] * u) / arc[..., np.newaxis],
+        -d * u * shrink[..., np.newaxis] + (parallel * slope)[..., np.newaxis] * bend,
     )
-    derivative = np.concatenate([by_length[..., np.newaxis], by_bend], axis=-1)
-    return np.where(inner, arc, chord), derivative
+    return np.concatenate([by_length[..., np.newaxis], by_bend], axis=-1)
 
 
 def _paper_fit(q: FloatArray, geometry: Geometry, hint: Hint | None) -> Arc:
@@ -347,7 +353,8 @@ def _paper_newton(
     limit = np.broadcast_to(0.5 * np.mean(q, axis=-1), length.shape)
     for _ in range(rounds):
         bend = np.einsum("...j,...ij->...i", along, basis)
-        value, derivative = _paper_rule(length, bend, inner, d, u)
+        value = _paper_cases(length, bend, inner, d, u)
+        derivative = _paper_derivative(length, bend, inner, d, u)
         # Unknowns L and d·along: both in mm.
         derivative[..., 1:] = derivative[..., 1:] @ basis / d
         transposed = np.swapaxes(derivative, -1, -2)

@@ -48,7 +48,12 @@ def test_forward_finds_the_arc_that_made_the_lengths(
 ) -> None:
     arc = Arc.from_angles(length_mm=length, theta_rad=theta, alpha_rad=alpha)
     back = kinematics.forward(tendons.lengths(arc, GEOMETRY, model), GEOMETRY, model)
-    assert np.abs(kinematics.position(back) - kinematics.position(arc)).max() < 1e-9
+    error = np.abs(kinematics.position(back) - kinematics.position(arc)).max()
+    # Where a tendon almost lies on the boundary of a spring that is almost straight, several arcs
+    # have the same lengths to the last bit.
+    on_boundary = abs(math.remainder(alpha, math.pi / 2)) < 1e-3
+    ambiguous = model == "paper" and theta < 1e-2 and on_boundary
+    assert error < (1e-5 if ambiguous else 1e-9)
 
 
 @pytest.mark.parametrize("count", [3, 5, 6])
