@@ -68,7 +68,7 @@ def reference_page() -> str:
     lines += ["", "## Codes"]
     for codes in schema.CODES:
         remedy = any(code.remedy for code in codes.values)
-        lines += ["", f"### {codes.name}", "", codes.doc, ""]
+        lines += ["", f"### Code {codes.name}", "", codes.doc, ""]
         lines += ["| Value | Name | Meaning |" + (" What to do |" if remedy else "")]
         lines += ["|---|---|---|" + ("---|" if remedy else "")]
         for code in codes.values:
@@ -88,7 +88,7 @@ def field_table(fields: tuple[Field, ...]) -> list[str]:
     offset = 0
     for field in fields:
         doc = cell(field.doc) + (
-            f" ([{field.codes}](#{field.codes.lower()}))" if field.codes else ""
+            f" ([{field.codes}](#code-{field.codes.lower()}))" if field.codes else ""
         )
         lines.append(f"| {offset} | `{field.name}` | {field.text} | {doc} |")
         offset += field.size
