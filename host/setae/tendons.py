@@ -7,8 +7,8 @@ Two models behind one interface, chosen by name:
     arcs, q = L − d (Δ·u). Linear, and smooth everywhere.
 ``paper``
     Equation 12 to the letter: an arc on the inner half, a chord on the outer
-    half. A tendon that crosses from one half to the other *jumps*, up to 9 mm
-    at θ = 90°.
+    half. A tendon that crosses from one half to the other *jumps*, by 8 mm
+    at θ = 90° and full length.
 
 Here u is the unit vector from the axis to the tendon and Δ the bending vector.
 A further model is one more entry in `MODELS`, and its name in
