@@ -444,14 +444,14 @@ class _Log:
         )
 
     def _stage(self, time_us: int) -> None:
+        if time_us < self._stage_due_us:
+            return
+        self._stage_due_us = time_us + _STAGE_PERIOD_US
         stage = self._rig.stage
         moving = stage.moving
-        resting = not moving and self._stage_moving is False
-        if resting or (moving and self._stage_moving and time_us < self._stage_due_us):
-            return
-        self.recorder.stage(time_us, position_mm=stage.position_mm, moving=moving)
+        if moving or self._stage_moving is not False:
+            self.recorder.stage(time_us, position_mm=stage.position_mm, moving=moving)
         self._stage_moving = moving
-        self._stage_due_us = time_us + _STAGE_PERIOD_US
 
     def _truth(self, world: World) -> None:
         truth = world.truth()

@@ -1,0 +1,242 @@
+"""What the command line says when something is wrong: one line, what to do, no traceback."""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import serial
+from serial.tools import list_ports_common
+
+from setae.cli import main
+from setae.link import session as sessions
+from setae_protocol.frame import HostDecoder, encode_board
+from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, Hello, HelloReply
+
+
+@contextmanager
+def pseudo_port(answer: Callable[[bytes], bytes] = lambda _: b"") -> Iterator[str]:
+    """A serial port at whose other end `answer` decides what comes back."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    over_read, over_write = os.pipe()
+
+    def serve() -> None:
+        while True:
+            ready, _, _ = select.select([ours, over_read], [], [])
+            if over_read in ready:
+                return
+            reply = answer(os.read(ours, 4096))
+            if reply:
+                os.write(ours, reply)
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    try:
+        yield os.ttyname(theirs)
+    finally:
+        os.write(over_write, b"x")
+        thread.join()
+        for number in (ours, theirs, over_read, over_write):
+            os.close(number)
+
+
+class OtherVersion:
+    """A board with the firmware of another protocol version."""
+
+    def __init__(self) -> None:
+        self._decoder = HostDecoder()
+
+    def __call__(self, data: bytes) -> bytes:
+        out = b""
+        for frame in self._decoder.feed(data):
+            if isinstance(frame.message, Hello):
+                out += encode_board(
+                    HelloReply(
+                        protocol_version=PROTOCOL_VERSION + 1,
+                        schema_hash=SCHEMA_HASH ^ 0xFFFF,
+                        token=frame.message.token,
+                        firmware_major=9,
+                        firmware_minor=8,
+                        firmware_patch=7,
+                        previous_session=0,
+                        reset_cause=0,
+                        limits_crc=0,
+                        pose_known=0,
+                        pulse_ticks=(0, 0, 0, 0),
+                        sensor=0,
+                    ),
+                    session=0,
+                )
+        return out
+
+
+def error_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Run `setae` and return its one line of error."""
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code not in (0, None)
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.out + captured.err
+    lines = captured.err.strip().splitlines()
+    assert len(lines) == 1, captured.err
+    return lines[0]
+
+
+def test_a_port_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    error = error_of(capsys, "info", "--port", "/dev/nothing-here")
+    assert "/dev/nothing-here" in error
+    assert "setae ports" in error
+
+
+def test_a_port_that_another_program_holds(capsys: pytest.CaptureFixture[str]) -> None:
+    with pseudo_port() as port, serial.Serial(port, exclusive=True):
+        error = error_of(capsys, "info", "--port", port)
+    assert port in error
+    assert "Another program" in error
+
+
+def test_no_board_on_any_port_lists_the_ports(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port = list_ports_common.ListPortInfo("/dev/ttyS7")
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [port])
+    error = error_of(capsys, "info")
+    assert "/dev/ttyS7" in error
+    assert "--sim" in error
+
+
+def test_two_boards_ask_for_a_choice(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = []
+    for name in ("/dev/ttyACM0", "/dev/ttyACM1"):
+        port = list_ports_common.ListPortInfo(name)
+        port.vid, port.pid = 0x2341, 0x0043
+        found.append(port)
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: found)
+    error = error_of(capsys, "info")
+    assert "/dev/ttyACM0, /dev/ttyACM1" in error
+    assert "--port" in error
+
+
+def test_a_board_that_does_not_answer(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The real wait covers a bootloader; nothing answers here however long it is.
+    monkeypatch.setattr(sessions.Session.open, "__defaults__", (300_000,))
+    with pseudo_port() as port:
+        error = error_of(capsys, "info", "--port", port)
+    assert port in error
+    assert "setae flash" in error
+
+
+def test_firmware_of_another_version_names_both_and_the_remedy(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pseudo_port(OtherVersion()) as port:
+        error = error_of(capsys, "info", "--port", port)
+    assert "9.8.7" in error
+    assert f"protocol {PROTOCOL_VERSION + 1}" in error
+    assert f"protocol {PROTOCOL_VERSION} " in error
+    assert "setae flash" in error
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        (("0", "0", "600"), "600.00 mm"),
+        (("0", "0", "-5"), "z = -5"),
+        (("nan", "0", "60"), "nan"),
+        (("inf", "0", "60"), "inf"),
+    ],
+)
+def test_an_unreachable_target(
+    target: tuple[str, str, str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert words in error_of(capsys, "move", *target, "--sim")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[geometry]\ntendon_radius = 8.0\n", "tendon_radius_mm"),
+        ("[geometry\n", "TOML"),
+        ("[explore]\nsteps = -1\n", "steps"),
+        ("[simulator]\nno_such_thing = 1.0\n", "no_such_thing"),
+    ],
+)
+def test_a_broken_configuration(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    assert words in error_of(capsys, "info", "--sim", "--config", str(path))
+
+
+def test_a_configuration_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "no-such.toml" in error_of(capsys, "info", "--sim", "--config", "no-such.toml")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--obstacle", "deep"), "deep"),
+        (("--obstacle", "-5"), "above 0 mm"),
+        (("--obstacle", "nan"), "finite"),
+        (("--obstacle", "35", "--trials", "paper"), "--trials"),
+        (("--port", "/dev/ttyACM0"), "--port"),
+        (("--seed", "-1"), "--seed"),
+    ],
+)
+def test_what_explore_can_not_do(
+    arguments: tuple[str, ...],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / "out"
+    assert words in error_of(capsys, "explore", "--sim", "--out", str(out), *arguments)
+    assert not out.exists()
+
+
+def test_a_folder_with_files_is_not_written_into_without_force(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "precious.txt").write_text("mine")
+    error = error_of(capsys, "explore", "--sim", "--out", str(tmp_path))
+    assert "--force" in error
+    assert [path.name for path in tmp_path.iterdir()] == ["precious.txt"]
+
+
+def test_a_file_that_is_no_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "some.mcap"
+    path.write_bytes(b"not a log")
+    for command in ("replay", "report"):
+        assert "some.mcap" in error_of(capsys, command, str(path))
+
+
+def test_flashing_without_sources_or_tools_says_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert "platformio.ini" in error_of(capsys, "flash")
+    (tmp_path / "some.hex").write_text(":00000001FF\n")
+    monkeypatch.setattr("shutil.which", lambda *_, **__: None)
+    assert "avrdude" in error_of(capsys, "flash", "--hex-file", "some.hex")
+    assert "other.hex" in error_of(capsys, "flash", "--hex-file", "other.hex")
+
+
+def test_an_unknown_option_is_an_error_too(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["explore", "--no-such-option"])
+    assert ended.value.code not in (0, None)
+    captured = capsys.readouterr()
+    assert "no-such-option" in captured.out + captured.err
+    assert "Traceback" not in captured.out + captured.err
