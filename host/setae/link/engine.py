@@ -187,7 +187,7 @@ class Engine:
         self._tries = 0
         self._resent_at_us: int | None = None
         # Stop.
-        self._stop: Ticket | None = None
+        self._stops: list[Ticket] = []
         self._stop_number = 0
         self._stop_at_us = 0
         # What the board sends by itself.
@@ -254,7 +254,7 @@ class Engine:
         if self.phase is Phase.FAILED:
             ticket.state = TicketState.FAILED
         elif isinstance(message, (Segments, GuardMessage)) and (
-            self._stop is not None or (self.is_open and message.epoch != self.epoch)
+            self._stops or (self.is_open and message.epoch != self.epoch)
         ):
             ticket.state = TicketState.DISCARDED
             ticket.discarded_by_epoch = self.epoch
@@ -273,13 +273,11 @@ class Engine:
             if isinstance(waiting.message, _EPOCH_BOUND):
                 self._queue.remove(waiting)
                 self._discard(waiting)
-        if self._stop is not None:
-            # The older of two stops under way has nothing left to do that this one doesn't.
-            self._stop.state = TicketState.EXECUTED
         self._raise_stop_number()
         ticket.message = Stop(stop_number=self._stop_number)
-        self._stop = ticket
         ticket.state = TicketState.SENT
+        # The newest stands for all that are under way: once it is done, so are they.
+        self._stops.append(ticket)
         self._send_stop(now_us)
         return ticket
 
@@ -316,10 +314,10 @@ class Engine:
     def poll(self, now_us: int) -> None:
         """Do what is due: repeat, give up, ask."""
         if self.phase in (Phase.CLOSED, Phase.FAILED):
-            if self._stop is not None and now_us >= self._stop_at_us:
+            if self._stops and now_us >= self._stop_at_us:
                 self._send_stop(now_us)
             return
-        if self._stop is not None and now_us >= self._stop_at_us:
+        if self._stops and now_us >= self._stop_at_us:
             if self.telemetry is None:
                 # Nobody told the number of the board's last stop; ours may be the same.
                 self._raise_stop_number()
@@ -356,7 +354,7 @@ class Engine:
         if self.phase is Phase.FAILED:
             return None
         times = []
-        if self._stop is not None:
+        if self._stops:
             times.append(self._stop_at_us)
         if self.phase in (Phase.ASKING, Phase.OPENING, Phase.SETTLING):
             times.append(self._repeat_at_us)
@@ -418,7 +416,7 @@ class Engine:
 
     def _raise_stop_number(self) -> None:
         last = self._stop_number
-        if self._stop is None and self.telemetry is not None:
+        if not self._stops and self.telemetry is not None:
             last = self.telemetry.stop_number
         self._stop_number = (last + 1) & 0xFF
 
@@ -652,7 +650,7 @@ class Engine:
         self._events.append(
             TelemetryReceived(message, self.state, header.epoch, self.credit, now_us)
         )
-        if self._stop is not None and message.stop_number == self._stop_number:
+        if self._stops and message.stop_number == self._stop_number:
             self._stop_done()
         self._confirm(message.frame)
         if self.phase is Phase.SETTLING and self._settled:
@@ -724,9 +722,9 @@ class Engine:
     # ---------------------------------------------------------------------------- ends
 
     def _stop_done(self) -> None:
-        if self._stop is not None:
-            self._stop.state = TicketState.EXECUTED
-            self._stop = None
+        for ticket in self._stops:
+            ticket.state = TicketState.EXECUTED
+        self._stops.clear()
 
     def _discard(self, ticket: Ticket) -> None:
         ticket.state = TicketState.DISCARDED
@@ -745,9 +743,8 @@ class Engine:
         self.error = error
         tickets = [*self._queue, *(item.ticket for item in self._flight)]
         tickets += [item.ticket for item in self._unconfirmed]
-        if self._stop is not None:
-            tickets.append(self._stop)
-            self._stop = None
+        tickets += self._stops
+        self._stops.clear()
         for ticket in tickets:
             if not ticket.done:
                 ticket.state = TicketState.FAILED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import queue
 import threading
@@ -65,7 +66,8 @@ class SerialTransport:
         try:
             self._port.write(data)
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from error
+            self._lost = self._gone(error)
+            raise self._lost from error
 
     def receive(self, deadline_us: int) -> tuple[bytes, int] | None:
         """Wait for bytes until the deadline; LinkLostError if the port is gone."""
@@ -83,6 +85,8 @@ class SerialTransport:
     def close(self) -> None:
         """Close the port."""
         self._closing.set()
+        if self._port.is_open:
+            self._port.cancel_read()
         self._thread.join(timeout=2 * _READ_TIMEOUT_S)
         self._port.close()
 
@@ -106,7 +110,7 @@ class SerialTransport:
 
 def _open(port: str) -> serial.Serial:
     try:
-        return serial.Serial(
+        opened = serial.Serial(
             port,
             baudrate=BAUD,
             timeout=_READ_TIMEOUT_S,
@@ -114,6 +118,10 @@ def _open(port: str) -> serial.Serial:
             # Without it two programs can share a port and each gets half of the bytes.
             exclusive=True,
         )
+        # An FTDI chip holds bytes back for 16 ms otherwise. Other drivers can't, or needn't.
+        with contextlib.suppress(OSError, ValueError, NotImplementedError, AttributeError):
+            opened.set_low_latency_mode(True)
+        return opened
     except serial.SerialException as error:
         number = error.errno or getattr(error.__context__, "errno", None)
         if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV) or "FileNotFoundError" in str(error):

@@ -496,6 +496,17 @@ def test_second_stop_after_resume_acts(line: ModelTransport, session: Session) -
     assert line.board.state is State.STOPPED
 
 
+def test_two_stops_at_once_are_both_confirmed_by_the_board(
+    line: ModelTransport, session: Session
+) -> None:
+    session.request(Enable(pulse_ticks=POSE))
+    first, second = session.send_stop(), session.send_stop()
+    assert not first.done
+    session.run_until(lambda: second.done, SECOND_US)
+    assert first.state is second.state is TicketState.EXECUTED
+    assert line.board.state is State.STOPPED
+
+
 # ------------------------------------------------------------------------- ends of a session
 
 
