@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
+
+from sphinx.application import Sphinx
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "host"), str(HERE.parent / "protocol")]
@@ -35,3 +38,16 @@ autodoc_member_order = "bysource"
 autosummary_generate = False
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
+
+
+def link_within_pages(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Let the pages of protocol/ find each other here, where they are only linked to."""
+    if docname.startswith("protocol/"):
+        source[0] = re.sub(
+            r"\[([^]]+)\]\((README|REFERENCE)\.md\)", r"{doc}`\1 </protocol/\2>`", source[0]
+        )
+
+
+def setup(app: Sphinx) -> None:
+    """Register what the pages need."""
+    app.connect("source-read", link_within_pages)

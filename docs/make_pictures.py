@@ -1,0 +1,41 @@
+"""Make the pictures of README and documentation anew: run the exploration, draw it.
+
+    python docs/make_pictures.py [RUN_DIR]
+
+Without a folder it runs the paper's five trials in the simulator, seed 0. With
+one it draws the logs in it.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from setae.cli import app
+from setae.report import explore, pictures
+
+PICTURES = Path(__file__).resolve().parent / "pictures"
+
+
+def draw(run: Path) -> None:
+    """Draw a run's pictures into docs/pictures."""
+    trials = explore.trials(run)
+    for path in pictures.write_all(PICTURES, trials):
+        print(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+    pictures.animation(PICTURES / "explore.gif", pictures.telling(trials))
+
+
+def main(arguments: list[str]) -> None:
+    """Draw the given run, or one made for it."""
+    if arguments:
+        draw(Path(arguments[0]))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder) / "run"
+        app(["explore", "--sim", "--no-report", "--out", str(run)])
+        draw(run)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
