@@ -77,6 +77,10 @@ docs: .venv/.docs ## build the documentation into build/docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 	@echo 'setae: open build/docs/index.html'
 
+.PHONY: pictures
+pictures: .venv/.installed ## run the exploration, and draw the documentation's pictures anew
+	$(BIN)/python docs/make_pictures.py
+
 # ------------------------------------------------------------------------------ checks
 
 # In this order, so that what fails fastest comes first and pytest's count comes last.

@@ -42,6 +42,7 @@ numpydoc_class_members_toctree = False
 
 def link_within_pages(app: Sphinx, docname: str, source: list[str]) -> None:
     """Let the pages of protocol/ find each other here, where they are only linked to."""
+    del app
     if docname.startswith("protocol/"):
         source[0] = re.sub(
             r"\[([^]]+)\]\((README|REFERENCE)\.md\)", r"{doc}`\1 </protocol/\2>`", source[0]
