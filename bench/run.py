@@ -1,0 +1,202 @@
+"""Measure the whole and write results.json. `python bench/run.py --help` says how."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+# The oracle that judges explorations is the tests' own.
+sys.path.insert(0, str(ROOT))
+
+from bench import elf  # noqa: E402  # needs the path above
+from tests.system import oracle  # noqa: E402
+
+from setae import rig  # noqa: E402
+from setae.config import load  # noqa: E402
+from setae.experiments.explore import Event, explore  # noqa: E402
+from setae.scene import Obstacle, tube_scene  # noqa: E402
+from setae_protocol.messages import BOARD_OVERHEAD_BYTES, HOST_OVERHEAD_BYTES  # noqa: E402
+
+RUNS = 3
+RANDOM_TRIALS = 100
+RANDOM_SEED = 20250101
+ELF = ROOT / ".pio" / "build" / "uno" / "firmware.elf"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured figure."""
+
+    name: str
+    value: float
+    unit: str
+    how: str
+
+
+def paper_wall() -> Iterable[Figure]:
+    """How long a user waits for the paper's five trials."""
+    times = []
+    for _ in range(RUNS):
+        with tempfile.TemporaryDirectory() as folder:
+            start = time.perf_counter()
+            subprocess.run(
+                [sys.executable, "-m", "setae.cli", "explore", "--sim", "--trials", "paper",
+                 "--no-report", "--out", str(Path(folder) / "run")],
+                check=True, stdout=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            )  # fmt: skip
+            times.append(time.perf_counter() - start)
+    yield Figure(
+        "explore_paper_wall_s",
+        round(statistics.median(times), 2),
+        "s",
+        f"`setae explore --sim --trials paper --no-report`, with logs, median of {RUNS}",
+    )
+
+
+def realtime_factor() -> Iterable[Figure]:
+    """How much faster than the real thing the simulated one is."""
+    config = load()
+    factors = []
+    for _ in range(RUNS):
+        with rig.open("sim://", config=config, scene=tube_scene(config)) as opened:
+            opened.robot.enable()
+            start_s, start_us = time.perf_counter(), opened.robot.now_us
+            explore(opened.robot, opened.stage)
+            virtual_s = (opened.robot.now_us - start_us) / 1e6
+            factors.append(virtual_s / (time.perf_counter() - start_s))
+    yield Figure(
+        "sim_realtime_factor",
+        round(statistics.median(factors), 1),
+        "1",
+        "virtual over wall time of one exploration of the empty tube: host, link, board, plant"
+        f" and arm, without a log, median of {RUNS}",
+    )
+
+
+def frame_overhead() -> Iterable[Figure]:
+    """What a frame costs on the line besides its payload."""
+    yield Figure(
+        "frame_overhead_bytes",
+        HOST_OVERHEAD_BYTES,
+        "B",
+        "frame to the board: COBS, type, session, sequence, CRC-32C and delimiter",
+    )
+    yield Figure(
+        "frame_overhead_board_bytes",
+        BOARD_OVERHEAD_BYTES,
+        "B",
+        "frame from the board: the same, and expected, credit, epoch and state",
+    )
+
+
+def firmware_size() -> Iterable[Figure]:
+    """How much of the UNO the firmware takes."""
+    if not ELF.is_file():
+        subprocess.run(
+            [str(ROOT / ".ci" / "platformio" / "pio"), "run", "-e", "uno"], cwd=ROOT, check=True
+        )
+    sizes = elf.sizes(ELF)
+    yield Figure(
+        "flash_bytes", sizes.flash_bytes, "B", "of 32256 beside the bootloader; the built ELF"
+    )
+    yield Figure("ram_static_bytes", sizes.ram_static_bytes, "B", "of 2048; the stack comes on top")
+
+
+def random_obstacles() -> Iterable[Figure]:
+    """Whether obstacles anywhere are found, and nothing else is."""
+    judged = _judged()
+    trials = f"{RANDOM_TRIALS} simulated trials with a cube of random height, direction and size"
+    yield Figure(
+        "explore_false_stops",
+        sum(judgement.false_stops > 0 for judgement in judged),
+        "trials",
+        f"{trials}, or none: a contact where the oracle says free by"
+        f" {oracle.FREE_MARGIN_MM:g} mm or more",
+    )
+    yield Figure(
+        "explore_missed_stops",
+        sum(judgement.missed > 0 for judgement in judged),
+        "trials",
+        f"the same {RANDOM_TRIALS}: no contact where the oracle says {oracle.TOUCH_MARGIN_MM:g} mm"
+        " deep or more",
+    )
+    yield Figure(
+        "explore_grazing",
+        sum(judgement.grazing for judgement in judged),
+        "directions",
+        f"between the two, so not judged; {sum(judgement.clear for judgement in judged)} others"
+        " came out right",
+    )
+
+
+@lru_cache(maxsize=1)
+def _judged() -> list[oracle.Judgement]:
+    config = load()
+    rng = np.random.default_rng(RANDOM_SEED)
+    judged = []
+    for number in range(RANDOM_TRIALS):
+        cube = oracle.random_cube(rng)
+        obstacle = None if cube is None else Obstacle(
+            below_tip_mm=cube.below_tip_mm, azimuth_deg=cube.azimuth_deg, edge_mm=cube.edge_mm
+        )  # fmt: skip
+        events: list[Event] = []
+        scene = tube_scene(config, obstacle)
+        with rig.open("sim://", config=config, seed=number, scene=scene) as opened:
+            opened.robot.enable()
+            explore(opened.robot, opened.stage, on_event=events.append)
+        judgement = oracle.judge(
+            cube,
+            {
+                event.data["descent_mm"]: set(event.data["touched_deg"])
+                for event in events
+                if event.name == "level_end"
+            },
+            sum(event.name == "lowering_contact" for event in events),
+        )
+        if judgement.false_stops or judgement.missed:
+            print(f"trial {number}: {cube} {judgement}", file=sys.stderr)
+        judged.append(judgement)
+    return judged
+
+
+FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
+    "paper_wall": paper_wall,
+    "realtime_factor": realtime_factor,
+    "frame_overhead": frame_overhead,
+    "firmware_size": firmware_size,
+    "random_obstacles": random_obstacles,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=FIGURES, help="measure only these")
+    parser.add_argument("--out", type=Path, default=ROOT / "bench" / "results.json")
+    options = parser.parse_args(arguments)
+    known: dict[str, dict[str, object]] = {}
+    if options.only and options.out.is_file():
+        known = {entry["name"]: entry for entry in json.loads(options.out.read_text())}
+    for name in options.only or FIGURES:
+        for figure in FIGURES[name]():
+            print(f"{figure.name:<28} {figure.value:>10g} {figure.unit:<10} {figure.how}")
+            known[figure.name] = asdict(figure)
+    options.out.write_text(json.dumps(list(known.values()), indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
