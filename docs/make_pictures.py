@@ -21,8 +21,7 @@ PICTURES = Path(__file__).resolve().parent / "pictures"
 def draw(run: Path) -> None:
     """Draw a run's pictures into docs/pictures."""
     trials = explore.trials(run)
-    for path in pictures.write_all(PICTURES, trials):
-        print(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+    pictures.write_all(PICTURES, trials)
     pictures.animation(PICTURES / "explore.gif", pictures.telling(trials))
 
 

@@ -224,9 +224,15 @@ def robot(
         draw_bristle()
 
 
+def contact_point_mm(contact: Contact) -> Floats:
+    """Return where a touch is drawn: its true place if known, else the estimate."""
+    known = np.isfinite(contact.true_point_mm).all()
+    return contact.true_point_mm if known else contact.point_mm
+
+
 def contact(axes: Any, view: View, contact: Contact, *, scale: float = 1.0) -> None:
     """Mark where the bristle touched: the true point if known, else the estimate."""
-    point = contact.true_point_mm if np.isfinite(contact.true_point_mm).all() else contact.point_mm
+    point = contact_point_mm(contact)
     if not np.isfinite(point).all():
         return
     x, y = view.flat(point)

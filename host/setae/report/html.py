@@ -77,8 +77,8 @@ def finding(rows: Sequence[Comparison]) -> str:
         )
     if without:
         false = sum(row.trial.touched for row in without)
-        touched = "touched nothing" if not false else f"reported a touch in {false}"
-        sentences.append(f"in {len(without)} without an obstacle it {touched}")
+        touched = "touched nothing" if not false else f"felt a touch in {false} of {len(without)}"
+        sentences.append(f"without an obstacle it {touched}")
     text = "; ".join(sentences)
     known = [row for row in rows if row.agrees is not None]
     if known:
@@ -314,19 +314,14 @@ def _motion(trial: Trial) -> dict[str, Any] | None:
 
 
 def _pressure(trial: Trial) -> dict[str, Any]:
-    log = trial.log
-    times_us = log.times_us("/pressure")
-    within = np.flatnonzero((times_us >= trial.start_us) & (times_us <= trial.end_us))
-    within = within[np.argsort(times_us[within], kind="stable")]
-    value = log.array("/pressure", "pressure_hpa")[within]
-    armed = log.array("/pressure", "armed")[within].astype(bool)
-    baseline = np.where(armed, log.array("/pressure", "baseline_hpa")[within], np.nan)
+    pressure = trial.pressure.between(trial.start_us, trial.end_us)
+    value = pressure.pressure_hpa
     # Near zero 32 bits are plenty; at 1013 hPa they would show steps.
     offset = float(np.round(np.nanmedian(value))) if value.size else 0.0
     return {
-        "time_s": _packed(trial.seconds(times_us[within]), "<f4"),
+        "time_s": _packed(trial.seconds(pressure.time_us), "<f4"),
         "change_hpa": _packed(value - offset, "<f4"),
-        "baseline_hpa": _packed(baseline - offset, "<f4"),
+        "baseline_hpa": _packed(pressure.baseline_hpa - offset, "<f4"),
         "offset_hpa": offset,
     }
 

@@ -16,6 +16,7 @@ from setae.report.trial import Contact, Direction, Level, Trial
 
 FLOOR_BELOW_MM = 30.0
 RIM_MM = 10.0
+_MARGIN_MM = 74.0  # for the parts' names
 _ABOVE_MM = drawing.HOLDER_HEIGHT_MM + 30.0  # the arm above frame D
 
 _STYLE = {
@@ -68,7 +69,8 @@ def write_all(folder: Path, trials: Sequence[Trial]) -> tuple[Path, ...]:
     written = []
     if shown.motion is not None:
         robot_picture(folder / "robot.png", shown)
-        written.append(folder / "robot.png")
+        overview_picture(folder / "explore.png", trials)
+        written += [folder / "robot.png", folder / "explore.png"]
     pressure_picture(folder / "pressure.png", shown)
     written.append(folder / "pressure.png")
     for name, draw in (
@@ -138,11 +140,11 @@ def robot_picture(path: Path, trial: Trial, *, title: bool = True) -> None:
     index, contact = moment(trial)
     floor = floor_mm([trial])
     with _style():
-        figure = _figure(9.0, 7.4)
-        axes = figure.add_axes((0.0, 0.0, 1.0, 0.9 if title else 1.0))
+        figure = _figure(9.0, 7.6)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 0.885 if title else 1.0))
         draw_scene(axes, trial, index, floor, [contact] if contact else [], scale=1.25)
+        _frame(axes, trial, floor, motion.arm_mm[index, 2] + _ABOVE_MM, margin_mm=_MARGIN_MM)
         _name_parts(axes, trial, index, contact)
-        _frame(axes, trial, floor, motion.arm_mm[index, 2] + _ABOVE_MM)
         if title:
             heading = (
                 "The bristle touches the obstacle"
@@ -157,51 +159,55 @@ def robot_picture(path: Path, trial: Trial, *, title: bool = True) -> None:
         _save(figure, path)
 
 
-def _frame(axes: Any, trial: Trial, floor: float, top_mm: float) -> None:
+def _frame(axes: Any, trial: Trial, floor: float, top_mm: float, *, margin_mm: float = 0.0) -> None:
     view = View.into(trial.tube)
     corners = np.array([[0.0, 0.0, floor], [0.0, 0.0, top_mm]])
     if trial.tube is not None:
         wall = shapes.shell(trial.tube, floor, RIM_MM).reshape(-1, 3)
         corners = np.concatenate([corners, wall])
     flat = view.flat(corners)
-    axes.set_xlim(flat[:, 0].min() - 6, flat[:, 0].max() + 6)
+    axes.set_xlim(flat[:, 0].min() - 6 - margin_mm, flat[:, 0].max() + 6 + 0.8 * margin_mm)
     axes.set_ylim(flat[:, 1].min() - 6, flat[:, 1].max() + 6)
 
 
 def _name_parts(axes: Any, trial: Trial, index: int, contact: Contact | None) -> None:
+    """Write the parts' names into the margins, each with a line to its part."""
     motion = trial.motion
     assert motion is not None
     view = View.into(trial.tube)
     arm, backbone = motion.arm_mm[index], motion.backbone_mm[index]
-    filament = motion.filament_mm[index]
-    names: list[tuple[str, Any, tuple[float, float]]] = [
-        ("robot arm", arm + np.array([0.0, 0.0, drawing.HOLDER_HEIGHT_MM + 14]), (-92, 4)),
-        ("holder with four servos", arm + np.array([0.0, 0.0, 42.0]), (-120, 0)),
-        ("spring and four tendons", backbone[9], (-118, 0)),
-        ("bristle", filament.mean(axis=0), (-92, -12)),
+    up = np.array([0.0, 0.0, 1.0])
+    left = [
+        ("robot arm", arm + (drawing.HOLDER_HEIGHT_MM + 14) * up),
+        ("holder with\nfour servos", arm + 42.0 * up),
+        ("spring and\nfour tendons", backbone[9]),
+        ("bristle", motion.filament_mm[index].mean(axis=0)),
     ]
+    right = []
     if contact is not None:
-        names.append((f"touch: {contact.change_hpa:+.0f} hPa", contact.true_point_mm, (70, 52)))
+        right.append((f"touch:\n{contact.change_hpa:+.0f} hPa", drawing.contact_point_mm(contact)))
     if trial.cube is not None:
-        low = np.array(trial.cube.centre_mm) - [trial.cube.edge_mm / 2, 0, trial.cube.edge_mm / 3]
-        names.append((f"cube, {trial.cube.edge_mm:.0f} mm", low, (-104, -26)))
-    for text, point, offset in names:
-        if not np.isfinite(point).all():
-            continue
-        axes.annotate(
-            text,
-            view.flat(np.asarray(point)),
-            xytext=offset,
-            textcoords="offset points",
-            ha="right" if offset[0] < 0 else "left",
-            va="center",
-            fontsize=11,
-            color=palette.CONTACT if text.startswith("touch") else palette.INK,
-            weight="bold" if text.startswith("touch") else "normal",
-            bbox={"boxstyle": "round,pad=0.25", "fc": "white", "ec": "none", "alpha": 0.8},
-            arrowprops={"arrowstyle": "-", "color": palette.MUTED, "lw": 0.9, "shrinkB": 3},
-            zorder=9,
-        )
+        corner = np.array(trial.cube.centre_mm) + trial.cube.edge_mm * np.array([0, -0.5, -0.3])
+        right.append((f"cube,\n{trial.cube.edge_mm:.0f} mm", corner))
+    edges = axes.get_xlim()
+    for names, x, side in ((left, edges[0] + _MARGIN_MM - 14, -1), (right, edges[1] - 50, 1)):
+        for text, point in names:
+            if not np.isfinite(point).all():
+                continue
+            end = view.flat(point)
+            touch = text.startswith("touch")
+            axes.annotate(
+                text,
+                end,
+                xytext=(x, end[1] + (14 if touch else 0)),
+                ha="right" if side < 0 else "left",
+                va="center",
+                fontsize=12,
+                color=palette.CONTACT if touch else palette.INK,
+                weight="bold" if touch else "normal",
+                arrowprops={"arrowstyle": "-", "color": palette.MUTED, "lw": 0.9},
+                zorder=9,
+            )
 
 
 # -------------------------------------------------------------------------- pressure
@@ -261,14 +267,8 @@ def _name_direction(axes: Any, trial: Trial, direction: Direction) -> None:
 
 
 def _pressure_axes(axes: Any, trial: Trial, start_us: int, end_us: int) -> None:
-    log = trial.log
-    times_us = log.times_us("/pressure")
-    within = np.flatnonzero((times_us >= start_us) & (times_us <= end_us))
-    within = within[np.argsort(times_us[within], kind="stable")]
-    seconds = trial.seconds(times_us[within])
-    pressure = log.array("/pressure", "pressure_hpa")[within]
-    baseline = log.array("/pressure", "baseline_hpa")[within]
-    armed = log.array("/pressure", "armed")[within].astype(bool)
+    pressure = trial.pressure.between(start_us, end_us)
+    seconds = trial.seconds(pressure.time_us)
     for level in trial.levels:
         for direction in level.directions:
             if direction.end_us >= start_us and direction.start_us <= end_us:
@@ -280,15 +280,22 @@ def _pressure_axes(axes: Any, trial: Trial, start_us: int, end_us: int) -> None:
                 )
     axes.fill_between(
         seconds,
-        np.where(armed, baseline - trial.threshold_hpa, np.nan),
-        np.where(armed, baseline + trial.threshold_hpa, np.nan),
+        pressure.baseline_hpa - trial.threshold_hpa,
+        pressure.baseline_hpa + trial.threshold_hpa,
         color=palette.INK,
         alpha=0.10,
         linewidth=0,
         label=f"baseline ± {trial.threshold_hpa:g} hPa while watching",
         zorder=1,
     )
-    axes.plot(seconds, pressure, color=palette.PRESSURE, linewidth=0.9, label="pressure", zorder=2)
+    axes.plot(
+        seconds,
+        pressure.pressure_hpa,
+        color=palette.PRESSURE,
+        linewidth=0.9,
+        label="pressure",
+        zorder=2,
+    )
     shown = [c for c in trial.contacts if start_us <= c.time_us <= end_us]
     if shown:
         axes.scatter(
@@ -389,9 +396,8 @@ def _rose(axes: Any, trial: Trial, depths: Sequence[float]) -> None:
 
 def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
     """Show how far down each trial went, beside the paper's."""
-    rows = compare(trials)
     with _style():
-        figure = _figure(9.0, 1.6 + 0.72 * len(rows))
+        figure = _figure(9.0, 1.6 + 0.72 * len(trials))
         axes = figure.add_axes((0.22, 0.17, 0.745, 0.62))
         figure.text(
             0.02, 0.935, "How deep it went before it stopped", fontsize=17, weight="bold",
@@ -401,43 +407,9 @@ def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
             0.02, 0.86, f"This run ({origin_note(trials)}) beside the paper's experiment.",
             fontsize=10.5, color=palette.MUTED, va="center",
         )  # fmt: skip
-        for row, item in enumerate(rows):
-            trial = item.trial
-            colour = palette.CONTACT if trial.touched else palette.PRESSURE
-            axes.barh(row, trial.descent_mm, height=0.36, color=colour, alpha=0.88, zorder=2)
-            axes.text(
-                trial.descent_mm + 1.5, row, f"{trial.descent_mm:.0f} mm",
-                va="center", weight="bold", color=colour,
-            )  # fmt: skip
-            if item.theirs is not None:
-                axes.plot(
-                    [item.theirs.descent_mm] * 2, [row - 0.36, row + 0.36], color=palette.INK,
-                    linewidth=2.4, zorder=3,
-                )  # fmt: skip
-        axes.set_yticks(
-            range(len(rows)),
-            [
-                "no obstacle"
-                if row.trial.obstacle_below_tip_mm is None
-                else f"obstacle {row.trial.obstacle_below_tip_mm:.0f} mm below"
-                for row in rows
-            ],
-            color=palette.INK,
-        )
-        axes.tick_params(axis="y", length=0)
-        axes.invert_yaxis()
-        axes.set_xlim(0, 1.18 * max(row.trial.descent_mm for row in rows))
-        axes.set_xlabel("descent of the arm (mm)")
-        axes.grid(axis="x", color=palette.GRID, zorder=0)
-        axes.spines["left"].set_visible(False)
-        patches = extras.load("matplotlib.patches")
-        lines = extras.load("matplotlib.lines")
+        _trials_axes(axes, trials)
         figure.legend(
-            handles=[
-                patches.Patch(color=palette.CONTACT, label="stopped by a touch"),
-                patches.Patch(color=palette.PRESSURE, label="no touch, all steps"),
-                lines.Line2D([], [], color=palette.INK, lw=2.4, label="the paper's robot"),
-            ],
+            handles=_trials_handles(),
             loc="upper right",
             bbox_to_anchor=(0.985, 0.985),
             frameon=False,
@@ -446,10 +418,93 @@ def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
         _save(figure, path)
 
 
+def _trials_axes(axes: Any, trials: Sequence[Trial]) -> None:
+    rows = compare(trials)
+    for row, item in enumerate(rows):
+        trial = item.trial
+        colour = palette.CONTACT if trial.touched else palette.PRESSURE
+        axes.barh(row, trial.descent_mm, height=0.36, color=colour, alpha=0.88, zorder=2)
+        axes.text(
+            trial.descent_mm + 1.5, row, f"{trial.descent_mm:.0f} mm",
+            va="center", weight="bold", color=colour,
+        )  # fmt: skip
+        if item.theirs is not None:
+            axes.plot(
+                [item.theirs.descent_mm] * 2, [row - 0.36, row + 0.36], color=palette.INK,
+                linewidth=2.4, zorder=3,
+            )  # fmt: skip
+    axes.set_yticks(
+        range(len(rows)),
+        [
+            "no obstacle"
+            if row.trial.obstacle_below_tip_mm is None
+            else f"obstacle {row.trial.obstacle_below_tip_mm:.0f} mm below"
+            for row in rows
+        ],
+        color=palette.INK,
+    )
+    axes.tick_params(axis="y", length=0)
+    axes.invert_yaxis()
+    axes.set_xlim(0, 1.18 * max((row.trial.descent_mm for row in rows), default=0.0) or 1.0)
+    axes.set_xlabel("descent of the arm (mm)")
+    axes.grid(axis="x", color=palette.GRID, zorder=0)
+    axes.spines["left"].set_visible(False)
+
+
+def _trials_handles() -> list[Any]:
+    patches = extras.load("matplotlib.patches")
+    lines = extras.load("matplotlib.lines")
+    return [
+        patches.Patch(color=palette.CONTACT, label="stopped by a touch"),
+        patches.Patch(color=palette.PRESSURE, label="no touch, all steps"),
+        lines.Line2D([], [], color=palette.INK, lw=2.4, label="the paper's robot"),
+    ]
+
+
+# ------------------------------------------------------------------------- overview
+
+
+def overview_picture(path: Path, trials: Sequence[Trial]) -> None:
+    """Put the touch, the depths and the pressure into one picture."""
+    trial = telling(trials)
+    motion = trial.motion
+    if motion is None:
+        return
+    index, contact = moment(trial)
+    floor = floor_mm([trial])
+    with _style():
+        figure = _figure(13.2, 6.9)
+        scene = figure.add_axes((0.0, 0.02, 0.53, 0.96))
+        draw_scene(scene, trial, index, floor, [contact] if contact else [], scale=1.1)
+        _frame(scene, trial, floor, motion.arm_mm[index, 2] + _ABOVE_MM, margin_mm=_MARGIN_MM)
+        _name_parts(scene, trial, index, contact)
+        depths = figure.add_axes((0.685, 0.57, 0.3, 0.3))
+        _trials_axes(depths, trials)
+        figure.text(0.56, 0.955, "How deep it went", fontsize=14, weight="bold", va="center")
+        figure.legend(
+            handles=_trials_handles(), loc="center left", bbox_to_anchor=(0.552, 0.91),
+            frameon=False, fontsize=9, ncols=3, columnspacing=1.0, handlelength=1.4,
+        )  # fmt: skip
+        if contact is not None:
+            felt = figure.add_axes((0.61, 0.11, 0.37, 0.24))
+            _pressure_axes(felt, trial, contact.time_us - 1_000_000, contact.time_us + 900_000)
+            figure.text(
+                0.56, 0.43, "What the bristle felt", fontsize=14, weight="bold", va="center"
+            )
+            handles, labels = felt.get_legend_handles_labels()
+            figure.legend(
+                handles, labels, loc="center left", bbox_to_anchor=(0.552, 0.385), frameon=False,
+                fontsize=9, ncols=3, columnspacing=1.0, handlelength=1.4,
+            )  # fmt: skip
+            felt.set_xlabel("time since the trial began (s)")
+        figure.text(0.985, 0.012, origin_note(trials), fontsize=9, color=palette.MUTED, ha="right")
+        _save(figure, path, dpi=130)
+
+
 # ------------------------------------------------------------------------ animation
 
 
-def animation(path: Path, trial: Trial, *, frames: int = 110, width_px: int = 620) -> None:
+def animation(path: Path, trial: Trial, *, frames: int = 96, width_px: int = 560) -> None:
     """Write an animated GIF: the way down, then the level where it ended in detail."""
     motion = trial.motion
     if motion is None:
@@ -465,36 +520,60 @@ def animation(path: Path, trial: Trial, *, frames: int = 110, width_px: int = 62
             touched = [c for c in trial.contacts if c.time_us <= now_us]
             draw_scene(axes, trial, index, floor, touched, scale=0.9)
             _frame(axes, trial, floor, motion.arm_mm[0, 2] + _ABOVE_MM)
-            descent = -motion.arm_mm[index, 2] + motion.arm_mm[0, 2]
+            descent = motion.arm_mm[0, 2] - motion.arm_mm[index, 2]
             figure.text(
-                0.03, 0.955, f"{descent:3.0f} mm down", fontsize=13, weight="bold", va="center"
+                0.03, 0.955, f"{descent:.0f} mm down", fontsize=13, weight="bold", va="center"
             )
+            fresh = bool(touched) and now_us - touched[-1].time_us < 600_000
             figure.text(
-                0.97, 0.955,
-                "touch!" if touched and now_us - touched[-1].time_us < 1_500_000 else
-                origin_note([trial]).split(",")[0],
-                fontsize=12, ha="right", va="center",
-                color=palette.CONTACT if touched else palette.MUTED,
-                weight="bold" if touched else "normal",
+                0.97, 0.955, "touch!" if fresh else origin_note([trial]).split(",")[0],
+                fontsize=13 if fresh else 11, ha="right", va="center",
+                color=palette.CONTACT if fresh else palette.MUTED,
+                weight="bold" if fresh else "normal",
             )  # fmt: skip
             buffer = BytesIO()
             figure.savefig(buffer, dpi=width_px / 5.2, format="png")
             images.append(image.open(buffer).convert("RGB"))
-    # One palette for all frames, or the background would flicker.
-    base = images[len(images) // 2].quantize(colors=128, method=image.Quantize.MEDIANCUT)
-    flat = [frame.quantize(palette=base, dither=image.Dither.NONE) for frame in images]
-    flat[0].save(path, save_all=True, append_images=flat[1:], duration=90, loop=0, optimize=True)
+    colours = _shared_palette(image, images[len(images) // 2])
+    flat = [frame.quantize(palette=colours, dither=image.Dither.NONE) for frame in images]
+    flat[0].save(path, save_all=True, append_images=flat[1:], duration=100, loop=0, optimize=True)
+
+
+def _shared_palette(image: Any, frame: Any) -> Any:
+    """Build one palette for all frames, or the background would flicker."""
+    thin = (  # colours of thin things, which would otherwise lose against the wall's blues
+        palette.CONTACT, palette.TENDON, palette.BRISTLE, palette.SPRING, palette.SILICONE,
+        palette.INK, palette.MUTED, palette.mix(palette.CONTACT, "#ffffff", 0.6),
+    )  # fmt: skip
+    strip = frame.height // 6
+    sample = image.new("RGB", (frame.width, frame.height + strip * len(thin)), "white")
+    sample.paste(frame, (0, 0))
+    for row, colour in enumerate(thin):
+        sample.paste(
+            colour, (0, frame.height + row * strip, frame.width, frame.height + (row + 1) * strip)
+        )
+    return sample.quantize(colors=160, method=image.Quantize.MEDIANCUT)
 
 
 def _story(trial: Trial, frames: int) -> list[int]:
-    """Indices of frames: little of the levels without a touch, more of the last."""
+    """Indices of frames: a little of each level, most around the first touch."""
     motion = trial.motion
     assert motion is not None
     if not trial.levels:
         times = np.linspace(trial.start_us, trial.end_us, frames)
         return [motion.at(float(time)) for time in times]
     last = trial.levels[-1]
-    early = np.linspace(trial.start_us, last.start_us, int(frames * 0.45), endpoint=False)
-    late = np.linspace(last.start_us, last.end_us, int(frames * 0.45), endpoint=False)
-    home = np.linspace(last.end_us, trial.end_us, frames - len(early) - len(late))
-    return [motion.at(float(time)) for time in np.concatenate([early, late, home])]
+    touch = next((d for d in last.directions if d.touched), last.directions[0])
+    parts = (
+        (trial.start_us, last.start_us, 0.34),
+        (touch.start_us, touch.end_us, 0.32),
+        (touch.end_us, last.end_us, 0.24),
+        (last.end_us, trial.end_us, 0.10),
+    )
+    times = np.concatenate(
+        [
+            np.linspace(start, end, max(round(frames * share), 2), endpoint=False)
+            for start, end, share in parts
+        ]
+    )
+    return [motion.at(float(time)) for time in times]

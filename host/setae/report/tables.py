@@ -118,18 +118,15 @@ def write_pressure(path: Path, trials: Sequence[Trial]) -> None:
     _write(
         path,
         (
-            "trial", "time_s", "pressure_hpa", "baseline_hpa", "armed", "descent_mm", "alpha_deg",
+            "trial", "time_s", "pressure_hpa", "baseline_hpa", "watched", "descent_mm", "alpha_deg",
         ),
         (row for trial in trials for row in _pressure_rows(trial)),
     )  # fmt: skip
 
 
 def _pressure_rows(trial: Trial) -> Iterable[tuple[object, ...]]:
-    log = trial.log
-    times_us = log.times_us("/pressure")
-    pressure = log.array("/pressure", "pressure_hpa")
-    baseline = log.array("/pressure", "baseline_hpa")
-    armed = log.array("/pressure", "armed")
+    pressure = trial.pressure
+    times_us = pressure.time_us
     descent = np.full(times_us.shape, np.nan)
     alpha = np.full(times_us.shape, np.nan)
     for level in trial.levels:
@@ -137,13 +134,14 @@ def _pressure_rows(trial: Trial) -> Iterable[tuple[object, ...]]:
         for direction in level.directions:
             within = (times_us >= direction.start_us) & (times_us <= direction.end_us)
             alpha[within] = direction.alpha_deg
-    for index in np.argsort(times_us, kind="stable"):
+    for index, time_us in enumerate(times_us):
+        baseline_hpa = float(pressure.baseline_hpa[index])
         yield (
             trial.number,
-            _number(float(trial.seconds(times_us[index])), 4),
-            _number(float(pressure[index]), 4),
-            _number(float(baseline[index]), 4) if armed[index] else "",
-            _flag(bool(armed[index])),
+            _number(float(trial.seconds(time_us)), 4),
+            _number(float(pressure.pressure_hpa[index]), 4),
+            _number(baseline_hpa, 4),
+            _flag(not math.isnan(baseline_hpa)),
             _number(float(descent[index]), 1),
             _number(float(alpha[index]), 1),
         )

@@ -129,6 +129,32 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Pressure:
+    """Samples of the bristle's sensor, in order of time.
+
+    Attributes
+    ----------
+    time_us, pressure_hpa
+        (n,)
+    baseline_hpa
+        (n,) what the board compared the sample with; NaN while it didn't watch.
+    """
+
+    time_us: NDArray[np.int64]
+    pressure_hpa: Floats
+    baseline_hpa: Floats
+
+    def between(self, start_us: float, end_us: float) -> Pressure:
+        """Return the samples of a stretch of time."""
+        within = (self.time_us >= start_us) & (self.time_us <= end_us)
+        return Pressure(
+            time_us=self.time_us[within],
+            pressure_hpa=self.pressure_hpa[within],
+            baseline_hpa=self.baseline_hpa[within],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """One way down the tube.
 
@@ -163,6 +189,7 @@ class Trial:
     tube: Tube | None
     cube: Cube | None
     motion: Motion | None
+    pressure: Pressure
     config: Config
     log: Log
 
@@ -230,10 +257,11 @@ def load(log: Log, *, number: int = 1) -> Trial:
     ends = [event for event in events if event.name == "trial_end"]
     aborts = [event for event in events if event.name == "trial_aborted"]
     levels = _levels(log)
+    lowering_contact = _lowering_contact(log)
     deepest_mm = max((level.descent_mm for level in levels), default=0.0)
     scene = log.metadata.get("scene") or {}
     config = _config(log)
-    return Trial(
+    trial = Trial(
         number=int(log.metadata.get("trial") or number),
         obstacle_below_tip_mm=_obstacle_below_tip_mm({**log.metadata, **start.data}),
         descent_mm=float(ends[-1].data.get("descent_mm", deepest_mm)) if ends else deepest_mm,
@@ -242,13 +270,16 @@ def load(log: Log, *, number: int = 1) -> Trial:
         start_us=start.time_us,
         end_us=ends[-1].time_us if ends else log.span_us[1],
         levels=levels,
-        lowering_contact=_lowering_contact(log),
+        lowering_contact=lowering_contact,
         tube=_tube(scene),
         cube=_cube(scene),
         motion=_motion(log, config),
+        pressure=_pressure(log),
         config=config,
         log=log,
     )
+    _watch_until_touch(trial)
+    return trial
 
 
 def _obstacle_below_tip_mm(about: Mapping[str, Any]) -> float | None:
@@ -442,6 +473,33 @@ def _config(log: Log) -> Config:
         return loads(str(log.metadata.get("config", "")), source=str(log.path))
     except ConfigError:
         return loads("")
+
+
+def _pressure(log: Log) -> Pressure:
+    time_us = log.times_us("/pressure")
+    order = np.argsort(time_us, kind="stable")
+    armed = log.array("/pressure", "armed").astype(bool)
+    baseline_hpa = np.where(armed, log.array("/pressure", "baseline_hpa"), np.nan)
+    return Pressure(
+        time_us=time_us[order],
+        pressure_hpa=log.array("/pressure", "pressure_hpa")[order],
+        baseline_hpa=baseline_hpa[order],
+    )
+
+
+def _watch_until_touch(trial: Trial) -> None:
+    """Count the deciding sample as watched.
+
+    The board says so with its next telemetry, and by then it has stopped watching.
+    """
+    pressure = trial.pressure
+    for contact in trial.contacts:
+        last = int(np.searchsorted(pressure.time_us, contact.time_us + 1000)) - 1
+        while last >= 0 and contact.time_us - pressure.time_us[last] < 50_000:
+            if not np.isnan(pressure.baseline_hpa[last]):
+                break
+            pressure.baseline_hpa[last] = contact.baseline_hpa
+            last -= 1
 
 
 def _tube(scene: Mapping[str, Any]) -> Tube | None:

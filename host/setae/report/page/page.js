@@ -382,7 +382,8 @@ function say() {
   else box.textContent = "The arm goes down.";
   const p = trial.pressure, i = indexBefore(p.time, now), base = p.base[i];
   $("alpha").textContent = d ? `${d.alpha_deg}°` : "–";
-  $("change").textContent = Number.isNaN(base) || base === undefined ? "–" : `${(p.value[i] - base >= 0 ? "+" : "−")}${Math.abs(p.value[i] - base).toFixed(1)} hPa`;
+  if (fresh) $("change").textContent = `${done[done.length-1].change_hpa >= 0 ? "+" : "−"}${Math.abs(done[done.length-1].change_hpa).toFixed(1)} hPa`;
+  else $("change").textContent = Number.isNaN(base) || base === undefined ? "–" : `${(p.value[i] - base >= 0 ? "+" : "−")}${Math.abs(p.value[i] - base).toFixed(1)} hPa`;
   $("touches").textContent = done.length;
   if (trial.motion) $("descent").textContent = `${Math.abs(shapeAt(trial.motion, 0).arm[2] - shapeAt(trial.motion, now).arm[2]).toFixed(0)} mm`;
   else $("descent").textContent = level ? `${level.descent_mm} mm` : "–";
@@ -398,7 +399,7 @@ function show(t) {
 function choose(index, t) {
   trial = run.trials[index];
   document.querySelectorAll("#tabs button").forEach((b, i) => b.setAttribute("aria-selected", String(i === index)));
-  const first = trial.contacts.length ? trial.contacts[0].time_s + 0.02 : 0;
+  const first = trial.contacts.length ? trial.contacts[0].time_s + 0.001 : 0;
   now = t === undefined ? first : t;
   say.key = null;
   buildScene(); buildPressure(); show(now);
