@@ -310,7 +310,8 @@ def _paper_fit_block(
         rounds=6,
     )
     candidates = Arc(length_mm=length, bend_rad=np.einsum("cpj,cij->cpi", along, basis))
-    error = np.sqrt(np.mean((_paper_lengths(candidates, geometry) - q) ** 2, axis=-1))
+    value = _paper_candidates(candidates, inner[:, every], geometry)
+    error = np.sqrt(np.mean((value - q) ** 2, axis=-1))
     if expected_mm is not None:
         top = candidates.top_mm
         distance = np.linalg.norm(top - expected_mm, axis=-1)
@@ -331,6 +332,19 @@ def _paper_fit_block(
         rounds=30,
     )
     return length, np.einsum("pj,pij->pi", along, basis[best])
+
+
+def _paper_candidates(arc: Arc, inner: BoolArray, geometry: Geometry) -> FloatArray:
+    """Lengths of candidates: by the rule, but a case that rounding alone contradicts stands."""
+    slack = 1e-10
+    theta = arc.theta_rad[..., np.newaxis]
+    beyond = _towards(arc, geometry) - BOUNDARY_TOLERANCE * theta
+    wrong = np.where(inner, beyond < -slack * theta, beyond > slack * theta)
+    contradicted = np.any(wrong, axis=-1, keepdims=True)
+    cases = np.where(contradicted, _inner(arc, geometry), inner)
+    return _paper_cases(
+        arc.length_mm, arc.bend_rad, cases, geometry.tendon_radius_mm, _directions(geometry)
+    )
 
 
 def _paper_newton(

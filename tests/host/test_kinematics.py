@@ -41,6 +41,7 @@ def test_position_and_inverse_are_each_others_inverse(
 @pytest.mark.parametrize("model", TENDON_MODELS)
 @given(length=lengths, theta=thetas, alpha=alphas)
 @example(length=20.0, theta=1.0, alpha=4.5e-7)  # inside the boundary's tolerance
+@example(length=20.0, theta=1.0, alpha=1e-6)  # at its very edge
 @example(length=20.0, theta=1.0, alpha=2e-6)  # just outside
 @example(length=20.0, theta=1.0, alpha=-2e-6)
 def test_forward_finds_the_arc_that_made_the_lengths(
