@@ -425,6 +425,17 @@ def test_trip_is_told_once_and_acknowledged(line: ModelTransport, session: Sessi
     assert len([event for event in events if isinstance(event, Tripped)]) == 2
 
 
+def test_doubled_records_are_told_once(line: ModelTransport) -> None:
+    session = Session(LossyTransport(line, seed=1, up=Faults(double=1.0)), session_id=7)
+    events = record_events(session)
+    session.open()
+    with pytest.raises(RefusedError):
+        session.request(segments(session))
+    line.board.trip()
+    session.run_for(SECOND_US)
+    assert len([event for event in events if isinstance(event, (Tripped, Refused))]) == 2
+
+
 def test_records_of_a_dead_host_are_told_as_earlier(line: ModelTransport) -> None:
     line.board.session = 7
     line.board.fault(Fault.SENSOR_SILENT)
@@ -493,6 +504,23 @@ def test_second_stop_after_resume_acts(line: ModelTransport, session: Session) -
     session.run_until(lambda: session.state is State.HOLDING, SECOND_US)
     session.stop()
     assert line.board.stops == 2
+    assert line.board.state is State.STOPPED
+
+
+def test_older_frames_that_show_stopped_do_not_confirm_a_newer_stop(
+    line: ModelTransport, session: Session
+) -> None:
+    """Stopped, resumed and stopped again, while the line to the board is dead for 60 ms."""
+    session.request(Enable(pulse_ticks=POSE))
+    session.stop()
+    line.deaf = True
+    session.send(Resume(epoch=session.epoch))
+    ticket = session.send_stop()
+    session.run_for(60_000)
+    assert not ticket.done
+    line.deaf = False
+    session.run_until(lambda: ticket.done, SECOND_US)
+    session.run_for(SECOND_US)
     assert line.board.state is State.STOPPED
 
 
