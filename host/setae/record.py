@@ -168,7 +168,7 @@ def _plain(value: Any) -> Any:
         return bool(value)
     if isinstance(value, np.ndarray):
         if value.dtype.kind == "f" and np.isfinite(value).all():
-            return np.round(value, DECIMALS).tolist()  # the fast way for the big ones
+            return value.round(DECIMALS).tolist()  # the fast way for the big ones
         return _plain(value.tolist())
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
@@ -179,8 +179,18 @@ def _plain(value: Any) -> Any:
     raise InputError(f"A log can't hold a value of type {type(value).__name__}.")
 
 
-def _encode(value: Mapping[str, Any]) -> bytes:
-    return json.dumps(_plain(value), separators=(",", ":"), ensure_ascii=False).encode()
+_ENCODER = json.JSONEncoder(
+    separators=(",", ":"), ensure_ascii=False, allow_nan=False, default=_plain
+)
+
+
+def _encode(time_us: int, data: Mapping[str, Any]) -> bytes:
+    # An array goes through _plain by itself; only other containers may hold what JSON can't say.
+    message: dict[str, Any] = {"time_us": time_us}
+    for key, value in data.items():
+        simple = type(value) in (int, str, bool, np.ndarray)
+        message[key] = value if simple else _plain(value)
+    return _ENCODER.encode(message).encode()
 
 
 # ------------------------------------------------------------------------- writing
@@ -285,7 +295,7 @@ class Recorder:
         if self._file is None:
             raise LogError(f"{self.path} is closed already.")
         time_us = int(time_us)
-        payload = _encode({"time_us": time_us, **data})
+        payload = _encode(time_us, data)
         with _LogErrors(self.path):
             if self._flush_due_us is None:
                 self._flush_due_us = time_us + FLUSH_US
