@@ -8,7 +8,8 @@ package knows whether anything is simulated.
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -156,8 +157,8 @@ def connect(
     >>> with connect("sim://") as robot:
     ...     robot.enable()
     ...     robot.move_to((0, 0, 60))
-    ...     robot.position_mm.round().tolist()
-    [0.0, 0.0, 60.0]
+    ...     round(float(robot.position_mm[2]), 1)
+    60.0
     """
     return open(url, config=config, seed=seed, leave=leave, pollables=pollables).robot
 
@@ -293,14 +294,23 @@ class Rig:
             self.robot.__exit__(kind, error, traceback)
         finally:
             # Last, so that the log holds how the robot was left.
-            if self._log is not None:
-                self._log.close()
+            self._close_log(error)
 
     def _stop_stage(self, error: BaseException) -> None:
         try:
             self.stage.stop()
         except StageError as failure:
             error.add_note(f"Stopping the arm failed too: {failure}")
+
+    def _close_log(self, error: BaseException | None) -> None:
+        if self._log is None:
+            return
+        try:
+            self._log.close()
+        except LogError as failure:
+            if error is None:
+                raise
+            error.add_note(f"Closing the log failed too: {failure}")
 
     def record(self, path: Path | str, *, metadata: Mapping[str, Any] | None = None) -> Recorder:
         """Log everything from now on, until the rig is left.
@@ -364,15 +374,35 @@ class _Log:
         self._stage_due_us = 0
         self._stage_moving: bool | None = None
         self._frames = 0
-        self._robot.on_command = lambda name, args: recorder.command(self._robot.now_us, name, args)
+        self._robot.on_command = self._on_command
         self._unsubscribe = self._robot.session.subscribe(self._on_event)
 
     def close(self) -> None:
-        self._unsubscribe()
-        self._robot.on_command = None
+        self._detach()
         self.recorder.close()
 
+    def _detach(self) -> None:
+        self._unsubscribe()
+        self._robot.on_command = None
+
+    def _on_command(self, name: str, args: Mapping[str, Any]) -> None:
+        with self._told_once():
+            self.recorder.command(self._robot.now_us, name, args)
+
     def _on_event(self, event: Event) -> None:
+        with self._told_once():
+            self._write(event)
+
+    @contextmanager
+    def _told_once(self) -> Iterator[None]:
+        """A full disk is told once. The robot still has to be stopped, and that comes by here."""
+        try:
+            yield
+        except LogError:
+            self._detach()
+            raise
+
+    def _write(self, event: Event) -> None:
         if isinstance(event, TelemetryReceived):
             self._telemetry(event)
         elif isinstance(event, Tripped):

@@ -301,8 +301,14 @@ class Robot:
             The board didn't confirm. It goes on with what it has queued, at most
             a second, then holds.
         """
-        self._told("stop")
-        self.session.stop()
+        ticket = self.session.send_stop()
+        try:
+            self._told("stop")
+        finally:
+            # Whatever the log says: the stop is on its way, and is seen through.
+            self.session.run_until(
+                lambda: ticket.done, round(_REPLY_S * 1e6), what="The stop's confirmation"
+            )
 
     def resume(self) -> None:
         """Leave stopped, tripped or fault; a running reflex is waited for."""
@@ -467,6 +473,7 @@ class Robot:
         self,
         begin: Callable[[], object],
         busy: Callable[[], bool],
+        abort: Callable[[], object],
         *,
         timeout_s: float,
     ) -> Contact | None:
@@ -478,26 +485,35 @@ class Robot:
             Called once the bristle watches; starts the other motion.
         busy
             True while the other motion lasts.
+        abort
+            Ends the other motion at once: called before anything else is done
+            about a contact, or about whatever else went wrong.
         timeout_s
             For the other motion.
 
         Returns
         -------
         Contact or None
-            A contact ends the wait at once; the robot holds. Ending the other
-            motion is the caller's.
+            After a contact the robot holds; the other motion was aborted, and may
+            still be braking.
         """
         self._require_holding()
         self._told("hold_guarded", timeout_s=timeout_s)
 
         def watch() -> bool:
-            begin()
-            self._wait(
-                lambda: self._trip is not None or not busy(),
-                timeout_s,
-                "the guarded motion to end",
-                trips=True,
-            )
+            try:
+                begin()
+                self._wait(
+                    lambda: self._trip is not None or not busy(),
+                    timeout_s,
+                    "the guarded motion to end",
+                    trips=True,
+                )
+            except BaseException:
+                abort()
+                raise
+            if self._trip is not None:
+                abort()
             return True
 
         return self._guarded(

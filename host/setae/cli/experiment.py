@@ -14,7 +14,7 @@ from rich.table import Table
 from setae import rig
 from setae.cli.common import Where, app, console, interrupts
 from setae.config import Config
-from setae.errors import InputError, SetaeError
+from setae.errors import ExtraMissingError, InputError, SetaeError
 from setae.experiments.explore import (
     PAPER_DESCENTS_MM,
     Event,
@@ -91,7 +91,7 @@ def explore(
             rig.open(
                 where.url,
                 config=config,
-                seed=where.seed,
+                seed=where.seed + number - 1,
                 scene=tube_scene(config, what),
                 stage=stage,
                 pollables=[interrupts],
@@ -130,7 +130,12 @@ _MANUAL_TIMEOUT_S = 600.0
 def _report(logs: Sequence[Path], folder: Path) -> None:
     from setae import report
 
-    path = report.write(logs, folder / "report.html")
+    try:
+        path = report.write(logs, folder / "report.html")
+    except ExtraMissingError as error:
+        # The experiment itself is done, and `setae report` can follow.
+        console.print(f"No report: {error}", style="yellow", soft_wrap=True)
+        return
     console.print(f"Report: {path}", soft_wrap=True)
 
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
 from cyclopts import Parameter
 from rich.table import Table
 
@@ -304,5 +305,8 @@ def _connect(where: Where | None, *, leave: rig.Leave) -> Iterator[Robot]:
         yield robot
 
 
-def _mm(values: object) -> str:
-    return "(" + ", ".join(f"{value:.1f}" for value in np.asarray(values, dtype=float)) + ") mm"
+def _mm(values: npt.ArrayLike) -> str:
+    # + 0.0: no minus before a zero.
+    return (
+        "(" + ", ".join(f"{value:.1f}" for value in np.round(np.asarray(values), 1) + 0.0) + ") mm"
+    )

@@ -15,6 +15,7 @@ Robot and arm may be real or simulated; nothing here can tell.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -22,6 +23,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from setae.config import Config
+from setae.errors import SetaeError
 from setae.robot import Contact, Robot
 from setae.scene import Obstacle
 from setae.stage import Stage
@@ -74,7 +76,8 @@ class Touch:
     tip_mm, tip_world_mm
         Estimated place of the bristle's tip, in frame D and in the world.
     uncertainty_mm
-        Of that place.
+        Of the spring's top at the contact, as in `setae.contact.Contact`; the tip
+        swings farther.
     pressure_hpa, baseline_hpa
         The deciding sample, and what it was compared with.
     time_us
@@ -283,11 +286,11 @@ class _Trial:
         contact = self._robot.hold_guarded(
             begin=lambda: self._stage.move_to(target_mm),
             busy=lambda: self._stage.moving,
+            abort=self._stage.stop,
             timeout_s=self._arm_timeout_s(target_mm),
         )
         if contact is None:
             return True
-        self._stage.stop()
         self._wait_for_arm(self._stage.position_mm)
         self._contacts.append(self._touch(contact, alpha_deg=None))
         self._emit("lowering_contact", contact=_touch_data(self._contacts[-1]))
@@ -339,7 +342,9 @@ class _Trial:
                 stop()
             except Exception as failure:
                 error.add_note(f"Stopping failed too: {failure}")
-        self._emit("trial_aborted", reason=f"{type(error).__name__}: {error}".strip(": "))
+        # If the log is what failed, it can't be told there.
+        with contextlib.suppress(SetaeError):
+            self._emit("trial_aborted", reason=f"{type(error).__name__}: {error}".strip(": "))
 
     def _compress(self) -> None:
         self._robot.compress(

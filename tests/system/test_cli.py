@@ -1,0 +1,74 @@
+"""The command line, where nothing is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from setae import record
+from setae.cli import main
+
+
+def output_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Run `setae` and return what it prints."""
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    captured = capsys.readouterr()
+    assert ended.value.code == 0, captured.err
+    return captured.out
+
+
+def test_explore_prints_the_table_and_leaves_logs_and_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    out = tmp_path / "run"
+    printed = output_of(
+        capsys, "explore", "--sim", "--obstacle", "5", "--azimuth", "90", "--out", str(out)
+    )
+    assert "descent 20 mm, 1 contacts" in printed
+    assert "90°" in printed
+    log = record.read(out / "trial-1.mcap")
+    assert log.damage is None
+    assert log.metadata["trial"] == 1
+    assert log.metadata["scene"]["cube"]["edge_mm"] == 40.0
+    assert (out / "report.html").stat().st_size > 10_000
+    # Again, into the same folder, because told so.
+    output_of(
+        capsys, "explore", "--sim", "--obstacle", "5", "--out", str(out), "--force", "--no-report"
+    )
+    replayed = output_of(capsys, "replay", str(out / "trial-1.mcap"))
+    assert "trial_start" in replayed
+    assert "trial_end" in replayed
+    assert "/trip" in replayed
+
+
+def test_without_out_the_next_free_folder_is_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / "explore-1").mkdir(parents=True)
+    short = tmp_path / "short.toml"
+    short.write_text("[explore]\nsteps = 1\ndirections = 1\n")
+    arguments = ("explore", "--sim", "--obstacle", "none", "--no-report", "--config", str(short))
+    output_of(capsys, *arguments)
+    assert (tmp_path / "runs" / "explore-2" / "trial-1.mcap").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("info",), "firmware"),
+        (("doctor",), "hPa peak to peak at rest"),
+        (("move", "15", "0", "60"), "At (15.0, 0.0, 60.0) mm"),
+        (("move", "-12", "0", "60", "--relax"), "At (-12.0"),
+        (("probe", "15", "0", "60"), "No contact"),
+        (("stop",), "stopped"),
+        (("relax",), "Relaxed"),
+    ],
+)
+def test_commands_for_one_robot(
+    arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert words in output_of(capsys, *arguments, "--sim")
