@@ -113,7 +113,8 @@ drift: .venv/.dev ## are the generated files those that the schema gives?
 
 .PHONY: firmware-test
 firmware-test: ## the firmware's unit tests, on this machine
-	$(PIO) test -e native
+	$(PIO) test -e native --json-output-path .pio/native.json
+	@$(PYTHON) .ci/count.py .pio/native.json
 
 .PHONY: firmware
 firmware: ## build the firmware for the UNO, and check its size
