@@ -8,11 +8,11 @@ one it draws the logs in it.
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from setae.cli import app
 from setae.report import explore, pictures
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
@@ -32,7 +32,8 @@ def main(arguments: list[str]) -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "run"
-        app(["explore", "--sim", "--no-report", "--out", str(run)])
+        command = [sys.executable, "-m", "setae.cli", "explore", "--sim", "--no-report"]
+        subprocess.run([*command, "--out", str(run)], check=True)
         draw(run)
 
 
