@@ -32,7 +32,7 @@ void Board::poll() {
 void Board::start() {
   started_ = true;
   now_ = hal_.now();
-  host_heard_frame_ = now_.frame;
+  idle_since_frame_ = now_.frame;
   sampled_frame_ = now_.frame;
   const Retained& retained = hal_.retained();
   if (retained.pose_known)
@@ -125,10 +125,12 @@ void Board::advance_motion() {
 }
 
 void Board::watch_hold_timeout() {
+  if (mode_ != Mode::kHolding)
+    idle_since_frame_ = now_.frame;
   const uint32_t timeout_frames = limits_.hold_timeout_frames();
-  if (mode_ != Mode::kHolding || timeout_frames == 0)
+  if (timeout_frames == 0)
     return;
-  if (now_.frame - host_heard_frame_ < timeout_frames)
+  if (now_.frame - idle_since_frame_ < timeout_frames)
     return;
   raise(Event::kHoldTimeout);
   drop_plans();

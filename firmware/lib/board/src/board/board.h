@@ -123,8 +123,8 @@ class Board {
   uint8_t attached_ = 0;  // for the next frame
   Line line_;             // unwinding and reflex
   PulseHistory history_;
-  Pulses rest_pose_ = {};  // where the servos attached: a hold that timed out returns there
-  uint32_t host_heard_frame_ = 0;
+  Pulses rest_pose_ = {};          // where the servos attached: a hold that timed out returns there
+  uint32_t idle_since_frame_ = 0;  // no motion, and nothing from the host
   uint32_t ran_dry_frame_ = 0;
   bool ran_dry_ = false;
   uint8_t underruns_ = 0;

@@ -35,7 +35,7 @@ void Board::handle_message() {
     return handle_hello();
   if (from.session != session_.id())
     return receiver_.count_stray();
-  host_heard_frame_ = now_.frame;
+  idle_since_frame_ = now_.frame;
 
   switch (receiver_.type()) {
     case MessageType::kPing: {
@@ -96,7 +96,7 @@ void Board::handle_hello() {
     return;
   }
   session_.start(hello.new_session);
-  host_heard_frame_ = now_.frame;
+  idle_since_frame_ = now_.frame;
   stop_known_ = false;
   receipt_wanted_ = false;
   gap_ = false;
