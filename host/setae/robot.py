@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from enum import IntEnum
 from functools import lru_cache
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -20,25 +19,18 @@ import numpy.typing as npt
 from setae import contact as contacts
 from setae import kinematics, servo, trajectory, workspace
 from setae.arc import Arc, finite_array
+from setae.board import REPLY_S, Board, Ticks, name_of
 from setae.config import Config
 from setae.contact import Contact
 from setae.errors import (
     ConfigError,
     DeadlineError,
-    FaultError,
     InputError,
     PoseUnknownError,
-    RefusedError,
-    StoppedError,
     TrajectoryError,
-    TrippedError,
     UnreachableError,
 )
 from setae.link.events import (
-    Event,
-    FaultReported,
-    TelemetryReceived,
-    Ticket,
     Tripped,
 )
 from setae.link.session import Session, refused_error
@@ -50,7 +42,6 @@ from setae_protocol.messages import (
     Guard,
     GuardMessage,
     HelloReply,
-    HostMessage,
     Limits,
     Limp,
     Reflex,
@@ -68,8 +59,6 @@ from setae_protocol.messages import (
 __all__ = ["Contact", "Robot"]
 
 _FRAME_S = SERVO_FRAME_US / 1e6
-# What an answer may take beyond the motion itself: the link's retries included.
-_REPLY_S = 2.0
 # After a motion the spring and the bristle swing on, and the servos lag.
 _SETTLE_S = 0.16
 # Attempts at a baseline; a bristle that swings gives a noisy one.
@@ -79,7 +68,6 @@ _RETRIED = (Refusal.TARE_NOISY, Refusal.TARE_FAR)
 _GUARD_FRAMES_MAX = 0xFFFF
 _LONG_MOTION_FRAMES = 20
 
-Ticks = tuple[int, int, int, int]
 # Half a second of work, and the same for every robot of a configuration.
 _board_limits = lru_cache(maxsize=8)(servo.board_limits)
 
@@ -112,12 +100,7 @@ class Robot:
         self.on_command: OnCommand | None = None
         self._servos = servo.ServoModel(config)
         self._pose_known = False
-        self._trip: Tripped | None = None
-        self._fault: FaultReported | None = None
-        self._telemetry: TelemetryReceived | None = None
-        self._pressure_hpa: float | None = None
-        self._tickets: list[Ticket] = []
-        session.subscribe(self._on_event)
+        self._board = Board(session)
 
     # ------------------------------------------------------------------- life
 
@@ -129,10 +112,10 @@ class Robot:
         ConfigError
             The board isn't relaxed and holds other limits.
         """
-        self._wait(lambda: self._telemetry is not None, _REPLY_S, "the board's first telemetry")
+        self._board.wait(lambda: self._board.reported, REPLY_S, "the board's first telemetry")
         wanted = _board_limits(self.config)
         if self.state is State.RELAXED:
-            self._request(wanted)
+            self._board.request(wanted)
         held = self.session.read_limits()
         if _values(held) == _values(wanted):
             return
@@ -142,7 +125,7 @@ class Robot:
                 "Flash the firmware of this version with `setae flash`.",
             )
         raise ConfigError(
-            f"The board is {_name(self.state)} under other limits than this configuration's.",
+            f"The board is {name_of(self.state)} under other limits than this configuration's.",
             "Relax it with the configuration it was started with, or reset it.",
         )
 
@@ -195,9 +178,7 @@ class Robot:
     @property
     def telemetry(self) -> Telemetry:
         """The board's latest report."""
-        if self._telemetry is None:
-            raise DeadlineError("The board has not reported yet.", "Call prepare() first.")
-        return self._telemetry.telemetry
+        return self._board.telemetry
 
     @property
     def pose_known(self) -> bool:
@@ -232,7 +213,7 @@ class Robot:
     @property
     def pressure_hpa(self) -> float | None:
         """The latest sample of the bristle's sensor; None before the first."""
-        return self._pressure_hpa
+        return self._board.pressure_hpa
 
     # ------------------------------------------------------------ on, off, stop
 
@@ -254,15 +235,15 @@ class Robot:
         if self.state is State.HOLDING:
             return
         if self.state is not State.RELAXED:
-            self._require_holding()
+            self._board.require_holding()
         if self.pose_known:
             ticks = self._ticks_now()
         elif accept_jump:
             ticks = self._free_ticks()
         else:
             raise PoseUnknownError("Nobody knows where the servos are: the first pulse may jump.")
-        self._request(Enable(pulse_ticks=ticks))
-        self._wait(lambda: self._at_rest(ticks), _REPLY_S, "the servos to attach")
+        self._board.request(Enable(pulse_ticks=ticks))
+        self._board.wait(lambda: self._board.at_rest(ticks), REPLY_S, "the servos to attach")
         self._pose_known = True
 
     def relax(self) -> None:
@@ -274,10 +255,10 @@ class Robot:
         slew = self._servos.speed_ticks(speed_mm_s)
         free = self._free_ticks()
         distance = max(abs(a - b) for a, b in zip(free, self._ticks_now(), strict=True))
-        self._request(Relax(slew_ticks=slew, free_ticks=free))
-        self._wait(
+        self._board.request(Relax(slew_ticks=slew, free_ticks=free))
+        self._board.wait(
             lambda: self.state is State.RELAXED,
-            distance / slew * _FRAME_S + _REPLY_S,
+            distance / slew * _FRAME_S + REPLY_S,
             "the robot to relax",
         )
 
@@ -287,9 +268,9 @@ class Robot:
         A stopped, tripped or faulty board stays so until `resume`.
         """
         self._told("limp")
-        self._request(Limp(reserved=0), watch=False)
-        self._wait(
-            lambda: self.telemetry.attached == 0, _REPLY_S, "the servos to go off", watch=False
+        self._board.request(Limp(reserved=0), watch=False)
+        self._board.wait(
+            lambda: self.telemetry.attached == 0, REPLY_S, "the servos to go off", watch=False
         )
 
     def stop(self) -> None:
@@ -307,7 +288,7 @@ class Robot:
         finally:
             # Whatever the log says: the stop is on its way, and is seen through.
             self.session.run_until(
-                lambda: ticket.done, round(_REPLY_S * 1e6), what="The stop's confirmation"
+                lambda: ticket.done, round(REPLY_S * 1e6), what="The stop's confirmation"
             )
 
     def resume(self) -> None:
@@ -315,22 +296,22 @@ class Robot:
         if self.state in (State.RELAXED, State.HOLDING):
             return
         if self.state is State.TRIPPED:
-            self._wait(
-                lambda: self.state is not State.TRIPPED or self._reflex_ended(),
-                _REPLY_S + 60.0,
+            self._board.wait(
+                lambda: self.state is not State.TRIPPED or self._board.reflex_ended(),
+                REPLY_S + 60.0,
                 "the reflex to end",
                 watch=False,
             )
         self._told("resume")
-        self._trip = self._fault = None
-        self._request(Resume(epoch=self.session.epoch), watch=False)
-        self._wait(
+        self._board.forget_records()
+        self._board.request(Resume(epoch=self.session.epoch), watch=False)
+        self._board.wait(
             lambda: self.state in (State.HOLDING, State.RELAXED),
-            _REPLY_S,
+            REPLY_S,
             "the board to resume",
             watch=False,
         )
-        self._wait_for_telemetry()
+        self._board.next_report()
 
     # ------------------------------------------------------------------ motion
 
@@ -416,7 +397,7 @@ class Robot:
         position_mm
             Target in frame D, (3,).
         speed_mm_s
-            Mean speed of the spring's top; default: the configured probe speed.
+            Highest speed of the bristle's tip; default: the configured probe speed.
         duration_s
             Time for the extension, instead of a speed.
         retract_mm
@@ -434,37 +415,36 @@ class Robot:
             The pressure was not steady enough for a baseline, or far from its
             rest value: the bristle touches something already.
         """
-        self._require_holding()
+        self._board.require_holding()
         target = self._lengths_for(position_mm, None)
         retract = (
             self._ticks_now()
             if retract_mm is None
             else self._ticks_for(self._lengths_for(retract_mm, None))
         )
-        if duration_s is None:
-            way_mm = float(np.linalg.norm(np.asarray(position_mm, dtype=float) - self.position_mm))
-            speed = speed_mm_s or self.config.motion.probe_speed_mm_s
-            duration_s = max(way_mm / _positive("speed_mm_s", speed), _FRAME_S)
-        elif speed_mm_s is not None:
+        if duration_s is not None and speed_mm_s is not None:
             raise InputError("Both duration_s and speed_mm_s are given.", "Give one of them.")
+        if duration_s is None:
+            duration_s = max(_FRAME_S, self._duration_for(position_mm, speed_mm_s))
         self._told("probe", position_mm=_list(position_mm), duration_s=duration_s,
                    retract_mm=None if retract_mm is None else _list(retract_mm))  # fmt: skip
         segments, duration_s = self._plan(target, duration_s, None)
         final = segments[-1].target_ticks if segments else self._ticks_now()
 
-        def extend() -> bool:
+        def extend() -> None:
             self._queue(segments)
-            self._wait(
-                lambda: self._trip is not None or self._at_rest(final),
-                duration_s + _REPLY_S,
+            self._board.wait(
+                lambda: self._board.trip is not None or self._board.at_rest(final),
+                duration_s + REPLY_S,
                 "the extension to end",
                 trips=True,
             )
-            return self._trip is not None or self._pause(_SETTLE_S)
+            # The servos lag, and so does the pressure: it watches on for a moment.
+            self._board.pause(_SETTLE_S)
 
         return self._guarded(
             extend,
-            limit_s=duration_s + _SETTLE_S + 2 * _REPLY_S,
+            limit_s=duration_s + _SETTLE_S + 2 * REPLY_S,
             reflex=Reflex.RETRACT,
             retract_ticks=retract,
         )
@@ -497,14 +477,14 @@ class Robot:
             After a contact the robot holds; the other motion was aborted, and may
             still be braking.
         """
-        self._require_holding()
+        self._board.require_holding()
         self._told("hold_guarded", timeout_s=timeout_s)
 
-        def watch() -> bool:
+        def watch() -> None:
             try:
                 begin()
-                self._wait(
-                    lambda: self._trip is not None or not busy(),
+                self._board.wait(
+                    lambda: self._board.trip is not None or not busy(),
                     timeout_s,
                     "the guarded motion to end",
                     trips=True,
@@ -512,13 +492,12 @@ class Robot:
             except BaseException:
                 abort()
                 raise
-            if self._trip is not None:
+            if self._board.trip is not None:
                 abort()
-            return True
 
         return self._guarded(
             watch,
-            limit_s=timeout_s + 2 * _REPLY_S,
+            limit_s=timeout_s + 2 * REPLY_S,
             reflex=Reflex.HOLD,
             retract_ticks=self._ticks_now(),
         )
@@ -535,7 +514,11 @@ class Robot:
         what
             What is waited for, for the message.
         """
-        self._wait(done, timeout_s, what)
+        self._board.wait(done, timeout_s, what)
+
+    def host_time_us(self, frame: int, phase_us: int) -> int:
+        """A board time on the session's clock."""
+        return self._board.host_time_us(frame, phase_us)
 
     # -------------------------------------------------------------- guarded moves
 
@@ -548,21 +531,24 @@ class Robot:
         retract_ticks: Ticks,
     ) -> Contact | None:
         """Arm, act, disarm; what was touched meanwhile."""
-        self._pause(_SETTLE_S)
+        self._board.pause(_SETTLE_S)
         self._arm(limit_s, reflex, retract_ticks)
         act()
-        if self._trip is None:
+        if self._board.trip is None:
             # A contact in the very last moment still wins over the disarming.
-            ticket = self._send(Disarm(reserved=0))
-            self._wait(
-                lambda: ticket.done or self._trip is not None,
-                _REPLY_S,
+            ticket = self._board.send(Disarm(reserved=0))
+            self._board.wait(
+                lambda: (
+                    self._board.trip is not None
+                    or (ticket.done and self.state is not State.TRIPPED)
+                ),
+                REPLY_S,
                 "the board to disarm",
                 trips=True,
             )
-        if self._trip is None:
+        if self._board.trip is None:
             return None
-        return self._end_of_trip(self._trip, limit_s)
+        return self._end_of_trip(self._board.trip, limit_s)
 
     def _arm(self, limit_s: float, reflex: Reflex, retract_ticks: Ticks) -> None:
         """Have the baseline taken. A bristle that still swings gets another chance."""
@@ -572,13 +558,13 @@ class Robot:
                 return
             if refusal.reason not in _RETRIED or attempt == _TARE_ATTEMPTS:
                 raise refused_error(refusal)
-            self._pause(_TARE_S)
+            self._board.pause(_TARE_S)
 
     def _try_to_arm(
         self, limit_s: float, reflex: Reflex, retract_ticks: Ticks
     ) -> RefusalMessage | None:
         bristle = self.config.bristle
-        ticket = self._send(
+        ticket = self._board.send(
             GuardMessage(
                 epoch=self.session.epoch,
                 threshold_raw=round(bristle.threshold_hpa * PRESSURE_LSB_PER_HPA),
@@ -590,9 +576,9 @@ class Robot:
             ),
             watch=False,
         )
-        self._wait(
+        self._board.wait(
             lambda: ticket.refusal is not None or self.telemetry.guard == Guard.ARMED,
-            _REPLY_S,
+            REPLY_S,
             "the board to take the baseline",
         )
         return ticket.refusal
@@ -605,7 +591,7 @@ class Robot:
                 "Call resume(), then try again with more time.",
             )
         found = self.contact_of(trip)
-        self._trip = None
+        self._board.forget_records()
         self.resume()
         return found
 
@@ -617,10 +603,6 @@ class Robot:
             time_us=self.host_time_us(trip.record.sample_frame, trip.record.sample_phase_us),
         )
 
-    def host_time_us(self, frame: int, phase_us: int) -> int:
-        """A board time on the session's clock."""
-        return round(self.session.clock.to_host_us(frame * SERVO_FRAME_US + phase_us))
-
     # -------------------------------------------------------------------- motion
 
     def _lengths_for(
@@ -631,6 +613,17 @@ class Robot:
             raise InputError(f"position_mm has shape {position.shape}.", "Give one x, y, z.")
         arc = kinematics.inverse(position)
         return workspace.require(arc, self.config, model)
+
+    def _duration_for(self, position_mm: npt.ArrayLike, speed_mm_s: float | None) -> float:
+        """Time for an extension whose tip is at most so fast."""
+        if speed_mm_s is None:
+            speed_mm_s = self.config.motion.probe_speed_mm_s
+        return trajectory.duration_for_speed(
+            self.pose,
+            kinematics.inverse(position_mm),
+            speed_mm_s,
+            tip_offset_mm=self.config.geometry.tip_offset_mm,
+        )
 
     def _require_allowed(self, ticks: Ticks) -> None:
         """Refuse here what the board would refuse: sums and differences of opposite tendons."""
@@ -652,29 +645,20 @@ class Robot:
         duration_s: float | None,
         speed_mm_s: float | None,
     ) -> None:
-        self._require_holding()
+        self._board.require_holding()
         segments, duration_s = self._plan(lengths_mm, duration_s, speed_mm_s)
         if not segments:
             return
         self._queue(segments)
         final = segments[-1].target_ticks
-        self._wait(lambda: self._at_rest(final), duration_s + _REPLY_S, "the move to end")
+        self._board.wait(
+            lambda: self._board.at_rest(final), duration_s + REPLY_S, "the move to end"
+        )
 
     def _queue(self, segments: list[Segment]) -> None:
         """Hand segments to the link, which sends them as the board has room."""
         for message in servo.segment_messages(segments, epoch=self.session.epoch):
-            self._send(message)
-
-    def _pause(self, duration_s: float) -> bool:
-        """Let time pass; True. Ends early with a trip."""
-        end_us = self.now_us + round(duration_s * 1e6)
-        self._wait(
-            lambda: self._trip is not None or self.now_us >= end_us,
-            duration_s + _REPLY_S,
-            "time to pass",
-            trips=True,
-        )
-        return True
+            self._board.send(message)
 
     def _plan(
         self,
@@ -687,7 +671,8 @@ class Robot:
         if duration_s is not None and speed_mm_s is not None:
             raise InputError("Both duration_s and speed_mm_s are given.", "Give one of them.")
         if duration_s is None:
-            speed = _positive("speed_mm_s", speed_mm_s or self.config.motion.move_speed_mm_s)
+            speed = self.config.motion.move_speed_mm_s if speed_mm_s is None else speed_mm_s
+            speed = _positive("speed_mm_s", speed)
             if speed > limit.min():
                 raise TrajectoryError(
                     f"{speed:g} mm/s is faster than the servos' {limit.min():.0f} mm/s.",
@@ -704,140 +689,7 @@ class Robot:
         segments = self._servos.segments(motion.lengths_mm, frames_each=frames_each)
         return list(segments), motion.duration_s
 
-    # ------------------------------------------------------------------- waiting
-
-    def _wait(
-        self,
-        done: Callable[[], bool],
-        timeout_s: float,
-        what: str,
-        *,
-        trips: bool = False,
-        watch: bool = True,
-    ) -> None:
-        """Wait in the session's loop.
-
-        Parameters
-        ----------
-        trips
-            A trip is what `done` looks for; otherwise it is an error.
-        watch
-            Whether a stop, trip or fault ends the wait with its error.
-        """
-
-        def settled() -> bool:
-            if watch:
-                self._raise_problem(trips=trips)
-            return done()
-
-        try:
-            self.session.run_until(settled, round(timeout_s * 1e6))
-        except DeadlineError:
-            raise DeadlineError(
-                f"Waited {timeout_s:.1f} s for {what}; the board is {_name(self.state)}.",
-                "Look at the robot; `setae doctor` checks the board.",
-            ) from None
-
-    def _raise_problem(self, *, trips: bool) -> None:
-        for ticket in self._tickets:
-            if ticket.refusal is not None:
-                self._tickets.clear()
-                raise refused_error(ticket.refusal)
-        if self.state is State.STOPPED:
-            raise StoppedError("The robot is stopped.")
-        if self._fault is not None:
-            raise _fault(self._fault)
-        if self._trip is not None and not trips:
-            raise self._trip_error(self._trip)
-
-    def _require_holding(self) -> None:
-        """Raise what keeps the robot from moving."""
-        state = self.state
-        if state is State.HOLDING:
-            return
-        if state is State.RELAXED:
-            raise RefusedError(
-                "not_enabled", "Call enable() first.", command="the motion",
-                detail="The servos have no pulses.",
-            )  # fmt: skip
-        if state is State.STOPPED:
-            raise StoppedError("The robot is stopped.")
-        if state is State.TRIPPED:
-            raise (
-                TrippedError("The robot is tripped: the bristle touched something.")
-                if (self._trip is None)
-                else self._trip_error(self._trip)
-            )
-        if state is State.FAULT:
-            raise (
-                FaultError("unknown", "Call resume() once its cause is gone.")
-                if (self._fault is None)
-                else _fault(self._fault)
-            )
-        raise RefusedError("busy", "Wait for the motion to end.", command="the motion",
-                           detail="The board is moving.")  # fmt: skip
-
-    def _trip_error(self, trip: Tripped) -> TrippedError:
-        record = trip.record
-        change_hpa = (record.pressure_raw - record.baseline_raw) / PRESSURE_LSB_PER_HPA
-        if record.cause == TripCause.DEADLINE:
-            return TrippedError("The guarded move passed its deadline and was frozen.",
-                                "Call resume(), then try again with more time.")  # fmt: skip
-        return TrippedError(
-            f"The bristle touched something ({change_hpa:+.1f} hPa) and the robot froze."
-        )
-
-    def _on_event(self, event: Event) -> None:
-        if isinstance(event, TelemetryReceived):
-            self._telemetry = event
-            telemetry = event.telemetry
-            if telemetry.sample_count:
-                sample = telemetry.samples[telemetry.sample_count - 1]
-                self._pressure_hpa = sample.pressure_raw / PRESSURE_LSB_PER_HPA
-        elif isinstance(event, Tripped) and not event.earlier:
-            self._trip = event
-        elif isinstance(event, FaultReported) and not event.earlier:
-            self._fault = event
-
-    def _reflex_ended(self) -> bool:
-        # The latest report may be from before the trip.
-        last = self._telemetry
-        return (
-            last is not None and last.state is State.TRIPPED and not last.telemetry.reflex_running
-        )
-
-    def _wait_for_telemetry(self) -> None:
-        """Wait for a report that was made after now."""
-        before = self._telemetry
-        self._wait(lambda: self._telemetry is not before, _REPLY_S, "telemetry", watch=False)
-
     # ------------------------------------------------------------------- details
-
-    def _send(self, message: HostMessage, *, watch: bool = True) -> Ticket:
-        ticket = self.session.send(message)
-        # A refusal stays until it is told.
-        self._tickets = [
-            known for known in self._tickets if not known.done or known.refusal is not None
-        ]
-        if watch:
-            self._tickets.append(ticket)
-        return ticket
-
-    def _request(self, message: HostMessage, *, watch: bool = True) -> None:
-        """Send a command and wait until the board has carried it out."""
-        ticket = self._send(message, watch=False)
-        self._wait(lambda: ticket.done, _REPLY_S, f"the board to take `{_name(message.TYPE)}`",
-                   watch=watch)  # fmt: skip
-        if ticket.refusal is not None:
-            raise refused_error(ticket.refusal)
-
-    def _at_rest(self, ticks: Ticks) -> bool:
-        telemetry = self.telemetry
-        return (
-            self.state is State.HOLDING
-            and telemetry.queued == 0
-            and tuple(telemetry.pulse_ticks) == tuple(ticks)
-        )
 
     def _told(self, name: str, **args: Any) -> None:
         if self.on_command is not None:
@@ -863,10 +715,6 @@ def _values(limits: Limits | SetLimits) -> bytes:
     return limits.pack()
 
 
-def _name(code: IntEnum) -> str:
-    return code.name.lower()
-
-
 def _list(values: npt.ArrayLike) -> list[float]:
     return [float(value) for value in np.asarray(values, dtype=float).ravel()]
 
@@ -875,8 +723,3 @@ def _positive(name: str, value: float) -> float:
     if not (math.isfinite(value) and value > 0):
         raise InputError(f"{name} is {value}.", "Give a number above 0.")
     return value
-
-
-def _fault(report: FaultReported) -> FaultError:
-    fault = report.record.fault
-    return FaultError(_name(fault), fault.remedy, detail=fault.doc)

@@ -112,8 +112,9 @@ def explore(
             setup, obstacles=obstacles, arm_timeout_s=None if simulated else _MANUAL_TIMEOUT_S
         )
     except KeyboardInterrupt as interrupt:
+        failures = getattr(interrupt, "__notes__", [])
         interrupt.__notes__ = [
-            "interrupted: robot and arm are stopped.",
+            *(["interrupted, but:", *failures] if failures else _STOPPED),
             *(f"The log {log} is closed and readable." for log in logs[-1:]),
         ]
         raise
@@ -122,6 +123,8 @@ def explore(
     if report:
         _report(logs, folder)
 
+
+_STOPPED = ["interrupted: robot and arm are stopped."]
 
 # A person jogs the arm by hand between two steps.
 _MANUAL_TIMEOUT_S = 600.0

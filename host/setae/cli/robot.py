@@ -119,7 +119,7 @@ def probe(
     x, y, z
         Target in mm.
     speed
-        Speed of the spring's top in mm/s.
+        Highest speed of the bristle's tip in mm/s.
     relax
         Relax afterwards instead of holding.
     accept_jump
@@ -307,6 +307,5 @@ def _connect(where: Where | None, *, leave: rig.Leave) -> Iterator[Robot]:
 
 def _mm(values: npt.ArrayLike) -> str:
     # + 0.0: no minus before a zero.
-    return (
-        "(" + ", ".join(f"{value:.1f}" for value in np.round(np.asarray(values), 1) + 0.0) + ") mm"
-    )
+    rounded = np.round(np.asarray(values), 1) + 0.0
+    return "(" + ", ".join(f"{value:.1f}" for value in rounded) + ") mm"
