@@ -29,12 +29,13 @@ The metadata that reports look for, all optional: ``simulated`` (bool), ``seed``
 
 in the world frame (z up). Frame D hangs from the arm: x_D = x, y_D = -y, z_D = -z.
 
-Events of the tube exploration on ``/experiment``: ``trial_start``,
-``level_start`` {descent_mm}, ``direction_start`` {alpha_deg, target_mm},
-``direction_end`` {alpha_deg, touched, contact}, ``level_end``, ``arm_return``,
-``trial_end`` {descent_mm, contacts}. ``contact`` is None or a mapping with
-``time_us``, ``tip_mm`` (the bristle's tip in frame D), ``pressure_hpa``,
-``baseline_hpa``.
+Events of the tube exploration on ``/experiment``: ``trial_start`` {obstacle},
+``arm_lowering``, ``lowering_contact`` {contact}, ``level_start`` {descent_mm},
+``direction_start`` {alpha_deg, target_mm}, ``direction_end`` {alpha_deg, touched,
+contact}, ``level_end``, ``arm_return``, ``trial_end`` {descent_mm, contacts},
+``trial_aborted`` {reason}. ``contact`` is None or a mapping with ``time_us``,
+``tip_mm`` (the bristle's tip in frame D), ``tip_world_mm``, ``uncertainty_mm``,
+``pressure_hpa``, ``baseline_hpa``.
 """
 
 from __future__ import annotations

@@ -160,8 +160,19 @@ def _origin(trials: Sequence[Trial]) -> str:
         )
     else:
         rows.append(("robot", "the real one; shapes are drawn from the commanded pulses"))
-    if metadata.get("seed") is not None:
-        rows.append(("seed", str(metadata["seed"])))
+    tube = trials[0].tube
+    if tube is not None:
+        beside_mm = math.hypot(*tube.axis_mm)
+        text = f"{tube.inner_radius_mm:g} mm inner radius"
+        if beside_mm >= 1.0:
+            text += (
+                f"; its axis is {beside_mm:g} mm beside the robot’s, on the side away from the "
+                "obstacle, so that the bristle can reach a cube at the wall"
+            )
+        rows.append(("tube", text))
+    seeds = dict.fromkeys(trial.log.metadata.get("seed") for trial in trials)
+    if None not in seeds:
+        rows.append(("seed" if len(seeds) == 1 else "seeds", ", ".join(map(str, seeds))))
     versions = metadata.get("versions") or {}
     if isinstance(versions, Mapping) and versions:
         rows.append(("versions", ", ".join(f"{name} {v}" for name, v in sorted(versions.items()))))

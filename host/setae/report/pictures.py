@@ -55,11 +55,13 @@ def _save(figure: Any, path: Path, dpi: int = 160) -> None:
 
 def origin_note(trials: Sequence[Trial]) -> str:
     """Say where the data come from, in one line."""
-    metadata = trials[0].log.metadata
     if not trials[0].simulated:
         return "measured on the robot"
-    seed = metadata.get("seed")
-    return "simulated" if seed is None else f"simulated, seed {seed}"
+    seeds = [trial.log.metadata.get("seed") for trial in trials]
+    if None in seeds:
+        return "simulated"
+    names = ", ".join(str(seed) for seed in dict.fromkeys(seeds))
+    return f"simulated, {'seeds' if ',' in names else 'seed'} {names}"
 
 
 def write_all(folder: Path, trials: Sequence[Trial]) -> tuple[Path, ...]:

@@ -234,12 +234,13 @@ function trail() {
 
 function buildScene() {
   const box = $("scene");
+  sceneReady = false;
   if (!trial.motion) {
+    Plotly.purge(box);
     box.innerHTML = "<p class='note' style='padding:30px'>This log holds no shape of the robot to draw.</p>";
-    sceneReady = false;
     return;
   }
-  const shape = shapeAt(trial.motion, now), d = dynamicTraces(shape);
+  const of = trial, shape = shapeAt(trial.motion, now), d = dynamicTraces(shape);
   const still = [...tubeTraces(trial.tube, run.floor_mm), ...cubeTraces(trial.cube)];
   const traces = [
     ...still,
@@ -266,14 +267,14 @@ function buildScene() {
       aspectmode: "manual", aspectratio: { x: size[0] * scale, y: size[1] * scale, z: size[2] * scale },
       camera, dragmode: "turntable",
     },
-  }, { displaylogo: false, responsive: true, displayModeBar: false }).then(() => { sceneReady = true; });
+  }, { displaylogo: false, responsive: true, displayModeBar: false }).then(() => { if (of === trial) { sceneReady = true; updateScene(); } });
 }
 function updateScene() {
   if (!sceneReady || busy) return;
   busy = true;
   const parts = dynamicTraces(shapeAt(trial.motion, now)).map(columns);
   Plotly.restyle($("scene"), { x: parts.map((p) => p.x), y: parts.map((p) => p.y), z: parts.map((p) => p.z) }, dynamic)
-    .then(() => { busy = false; });
+    .finally(() => { busy = false; });
 }
 
 // ------------------------------------------------------------------- pressure
@@ -363,7 +364,7 @@ function rose(of, until) {
     const [x, y] = polar(inner + (ring + 0.5) * step - 1, alphas.length ? alphas[0] + half : 0);
     parts.push(`<text x="${x}" y="${y}" style="font-size:5.6px;paint-order:stroke;stroke:#fff;stroke-width:2px">${depth}</text>`);
   });
-  return `<svg class="rose" viewBox="0 0 200 200" role="img" aria-label="directions touched for each depth in mm">${parts.join("")}</svg>`;
+  return `<svg class="rose" viewBox="-6 0 212 200" role="img" aria-label="directions touched for each depth in mm">${parts.join("")}</svg>`;
 }
 
 // ------------------------------------------------------------------------ page
