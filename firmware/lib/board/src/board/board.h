@@ -27,6 +27,14 @@
 
 namespace setae {
 
+// Keeps a message's bytes off the stack once the function that needs them is done: inlined, the
+// caller would hold those of all its messages at once.
+#ifdef __AVR__
+#define SETAE_OWN_FRAME __attribute__((noinline))
+#else
+#define SETAE_OWN_FRAME
+#endif
+
 class Board {
  public:
   // Touches no hardware: that begins with the first poll().
@@ -39,8 +47,8 @@ class Board {
 
  private:
   // ---- board.cpp: time ----
-  void start();
-  void begin_frame(const BoardTime& now);
+  SETAE_OWN_FRAME void start();
+  SETAE_OWN_FRAME void begin_frame(const BoardTime& now);
   void advance_motion();
   void watch_hold_timeout();
   void put_out();
@@ -65,42 +73,42 @@ class Board {
 
   // ---- commands.cpp: the host ----
   void receive();
-  void handle_message();
-  void handle_hello();
+  SETAE_OWN_FRAME void handle_message();
+  SETAE_OWN_FRAME void handle_hello();
   void handle_stop();
   void handle_reliable();
   bool carry_out();
   Verdict decide();
-  Verdict enable();
+  SETAE_OWN_FRAME Verdict enable();
   Verdict resume();
-  Verdict relax();
+  SETAE_OWN_FRAME Verdict relax();
   Verdict limp();
-  Verdict segments();
-  Verdict guard();
+  SETAE_OWN_FRAME Verdict segments();
+  SETAE_OWN_FRAME Verdict guard();
   Verdict disarm();
-  Verdict set_limits();
+  SETAE_OWN_FRAME Verdict set_limits();
   Verdict check_segments(const protocol::Segments& message) const;
   Verdict check_guard(const protocol::GuardMessage& message) const;
   // Latches the refusal, and stops the motion where a motion was refused.
-  void refuse(protocol::MessageType type, uint8_t sequence, const Verdict& verdict);
+  SETAE_OWN_FRAME void refuse(protocol::MessageType type, uint8_t sequence, const Verdict& verdict);
 
   // ---- safety.cpp: danger ----
   void read_sensor();
   void take_sample(const SensorReading& reading);
   RestLevel::Follow rest_follow() const;
   void refuse_tare(protocol::Refusal reason, uint32_t value, uint32_t limit);
-  void trip(protocol::TripCause cause);
-  void fault(protocol::Fault fault, uint32_t detail);
+  SETAE_OWN_FRAME void trip(protocol::TripCause cause);
+  SETAE_OWN_FRAME void fault(protocol::Fault fault, uint32_t detail);
   bool sensor_fault_persists() const;
 
   // ---- reports.cpp: what the host gets to know ----
   void report();
-  bool send_hello_reply();
-  bool send_limits();
-  bool send_pong();
-  bool send_telemetry();
+  SETAE_OWN_FRAME bool send_hello_reply();
+  SETAE_OWN_FRAME bool send_limits();
+  SETAE_OWN_FRAME bool send_pong();
+  SETAE_OWN_FRAME bool send_telemetry();
   template <typename Record>
-  void send_latched(Latch<Record>& latch);
+  SETAE_OWN_FRAME void send_latched(Latch<Record>& latch);
   protocol::BoardHeader header() const;
 
   Hal& hal_;

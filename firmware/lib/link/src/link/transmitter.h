@@ -17,18 +17,20 @@ class Transmitter {
   template <typename Message>
   bool send(protocol::BoardHeader header, const Message& message) {
     constexpr uint8_t kSize = protocol::BoardHeader::kSize + Message::kSize;
-    if (hal_.write_room() < kSize + protocol::kCrcBytes + protocol::kStuffingBytes)
+    uint8_t wire[kSize + protocol::kCrcBytes + protocol::kStuffingBytes];
+    if (hal_.write_room() < sizeof(wire))
       return false;
     header.type = static_cast<uint8_t>(Message::kType);
-    uint8_t frame[kSize + protocol::kCrcBytes];
+    header.sequence = sequence_++;
+    // The stuffing takes place where the frame is: one buffer, not two, on a small stack.
+    uint8_t* const frame = wire + 1;
+    encode(header, frame);
     encode(message, frame + protocol::BoardHeader::kSize);
-    write(header, frame, kSize);
+    hal_.write(wire, protocol::encode_frame(frame, kSize, wire));
     return true;
   }
 
  private:
-  void write(protocol::BoardHeader& header, uint8_t* frame, uint8_t size);
-
   Hal& hal_;
   uint8_t sequence_ = 0;
 };

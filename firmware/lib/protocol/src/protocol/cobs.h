@@ -8,7 +8,8 @@
 namespace setae {
 namespace protocol {
 
-// `wire` takes size + 1 bytes; the delimiter is not among them. size <= 253.
+// `wire` takes size + 1 bytes; the delimiter is not among them. size <= 253. In place where
+// data is wire + 1.
 void cobs_encode(const uint8_t* data, uint8_t size, uint8_t* wire);
 
 // Unstuffs one byte at a time.

@@ -17,7 +17,8 @@ static_assert(BoardHeader::kSize + kBoardPayloadMax + kCrcBytes <= kFrameBytesMa
 static_assert(HostHeader::kSize + kHostPayloadMax + kCrcBytes <= kFrameBytesMax, "");
 
 // Appends the CRC to the `size` bytes of header and payload in `frame`, which has room for it,
-// and writes the wire bytes, delimiter included. Returns how many.
+// and writes the wire bytes, delimiter included. Returns how many. In place where frame is
+// wire + 1.
 uint8_t encode_frame(uint8_t* frame, uint8_t size, uint8_t* wire);
 
 // Wire bytes in, whole frames with a right CRC out. Whatever else arrives is counted and
