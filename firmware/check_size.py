@@ -1,7 +1,7 @@
 """Does the firmware fit the ATmega328P, with room for the stack?
 
-PlatformIO only warns where RAM overflows, and leaves out the stack. This runs after
-each build of `env:uno`, or by hand: ``python firmware/check_size.py firmware.elf``.
+PlatformIO only warns where RAM overflows, and leaves out the stack. after_build.py runs
+this after each build; by hand: ``python firmware/check_size.py firmware.elf``.
 """
 
 from __future__ import annotations
@@ -24,9 +24,7 @@ def section_sizes(elf: bytes) -> dict[str, int]:
         raise ValueError("not an ELF32 little-endian file")
     (table_at,) = struct.unpack_from("<I", elf, 32)
     entry_size, entries, names_index = struct.unpack_from("<HHH", elf, 46)
-    headers = [
-        struct.unpack_from("<10I", elf, table_at + i * entry_size) for i in range(entries)
-    ]
+    headers = [struct.unpack_from("<10I", elf, table_at + i * entry_size) for i in range(entries)]
     names_at = headers[names_index][4]
     sizes = {}
     for header in headers:
@@ -62,11 +60,3 @@ def main(path: str) -> int:
 
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1]))
-elif "Import" in globals():  # PlatformIO runs this as a SCons script
-    Import("env")  # noqa: F821 - SCons gives scripts these names
-    env.AddPostAction(  # noqa: F821
-        "$BUILD_DIR/${PROGNAME}.elf",
-        env.VerboseAction(  # noqa: F821
-            lambda target, source, env: main(str(target[0])), "Checking that $TARGET fits"
-        ),
-    )

@@ -58,8 +58,10 @@ def install() -> None:
     shutil.rmtree(ENVIRONMENT, ignore_errors=True)
     venv.create(ENVIRONMENT, with_pip=True)
     subprocess.run(
-        [PYTHON, "-m", "pip", "install", "-qq", "--disable-pip-version-check"]
-        + ["--require-hashes", "--requirement", REQUIREMENTS],
+        [
+            *(PYTHON, "-m", "pip", "install", "-qq", "--disable-pip-version-check"),
+            *("--require-hashes", "--requirement", REQUIREMENTS),
+        ],
         check=True,
     )
     stamp.write_text(wanted)
@@ -67,7 +69,16 @@ def install() -> None:
 
 def registry_answers() -> bool:
     """Whether PlatformIO finds a package in its registry, soon enough."""
-    question = [PYTHON, "-m", "platformio", "pkg", "show", "atmelavr", "--type", "platform"]
+    question: list[str | Path] = [
+        PYTHON,
+        "-m",
+        "platformio",
+        "pkg",
+        "show",
+        "atmelavr",
+        "--type",
+        "platform",
+    ]
     try:
         return (
             subprocess.run(
@@ -144,7 +155,7 @@ def lay_out() -> None:
     stamp = CORE / ".laid-out"
     if stamp.exists() and stamp.read_text() == wanted:
         return
-    need = [PROJECT / ".ci" / "need", "--install", *DEBIAN_PACKAGES]
+    need: list[str | Path] = [PROJECT / ".ci" / "need", "--install", *DEBIAN_PACKAGES]
     if subprocess.run(need).returncode != 0:
         sys.exit(1)
     print("setae: PlatformIO's registry is out of reach; using .ci/platformio", file=sys.stderr)

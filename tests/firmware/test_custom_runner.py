@@ -14,7 +14,7 @@ from platformio.test.runners.doctest import DoctestTestRunner
 HEADERS = (Path("/usr/include/doctest/doctest.h"), Path("/usr/local/include/doctest/doctest.h"))
 
 
-class CustomTestRunner(DoctestTestRunner):
+class CustomTestRunner(DoctestTestRunner):  # type: ignore[misc]  # PlatformIO has no types
     """Take the system's doctest where it has one (Debian: doctest-dev)."""
 
     EXTRA_LIB_DEPS = (

@@ -18,9 +18,7 @@ env.Replace(
     SIZEDATAREGEXP=r"^(?:\.data|\.bss|\.noinit)\s+(\d+)",
 )
 to_hex = Builder(
-    action=env.VerboseAction(
-        "avr-objcopy -O ihex -R .eeprom $SOURCE $TARGET", "Building $TARGET"
-    ),
+    action=env.VerboseAction("avr-objcopy -O ihex -R .eeprom $SOURCE $TARGET", "Building $TARGET"),
     suffix=".hex",
 )
 env.Append(BUILDERS={"ElfToHex": to_hex})
