@@ -280,12 +280,16 @@ def test_other_results_give_another_table(tmp_path: Path) -> None:
     """A robot that gives up after two levels, and an obstacle the paper doesn't have."""
     write_log(tmp_path / "a.mcap", 1, 95.0, levels=2)
     write_log(tmp_path / "b.mcap", 2, 42.0)
+    write_log(tmp_path / "c.mcap", 3, None, levels=3, to_the_end=False)
     text = html.page(explore.trials(tmp_path))
     page = Page(text)
     assert page.table[0][2:] == ["40", "no", "0", "16", "100", "yes", "✗ differs"]
     assert page.table[1][1:3] == ["42", "40"]
     assert page.table[1][6:] == ["–", "–", ""]
-    assert "found the obstacle in 1 of 2 trials" in page.words
+    # A trial without its end is shown, but neither judged nor counted.
+    assert page.table[2][0] == "3 (not complete)"
+    assert page.table[2][6:] == ["100", "no", ""]
+    assert "found the obstacle in 1 of 2 trials. It stopped" in page.words
 
 
 def test_the_page_loads_nothing(run: Path) -> None:

@@ -67,6 +67,7 @@ def page(trials: Sequence[Trial]) -> str:
 
 def finding(rows: Sequence[Comparison]) -> str:
     """Say in a sentence or two what came out."""
+    rows = [row for row in rows if row.trial.complete]
     with_obstacle = [row for row in rows if row.trial.obstacle_below_tip_mm is not None]
     without = [row for row in rows if row.trial.obstacle_below_tip_mm is None]
     sentences = []
@@ -88,7 +89,7 @@ def finding(rows: Sequence[Comparison]) -> str:
             f". It stopped at the same depth as the paper’s robot in {how_many} {len(known)} "
             "trials that the paper reports"
         )
-    return text[:1].upper() + text[1:] + "." if text else "The run holds no trial."
+    return text[:1].upper() + text[1:] + "." if text else "No trial was completed."
 
 
 def _badges(trials: Sequence[Trial]) -> str:
@@ -124,7 +125,7 @@ def _table(rows: Sequence[Comparison]) -> str:
             None: "",
         }[row.agrees]
         cells = [
-            f"{trial.number}" + ("" if trial.complete else " (cut)"),
+            f"{trial.number}" + ("" if trial.complete else " (not complete)"),
             "none" if obstacle is None else f"{obstacle:g}",
             f"<b>{trial.descent_mm:g}</b>",
             touched,

@@ -22,7 +22,7 @@ class Comparison:
     ----------
     agrees
         Whether both stopped at the same depth and both touched or both didn't;
-        None where the paper has no such trial.
+        None where the paper has no such trial, or this one isn't complete.
     """
 
     trial: Trial
@@ -36,7 +36,7 @@ def compare(trials: Sequence[Trial]) -> tuple[Comparison, ...]:
     for trial in trials:
         theirs = paper.trial_like(trial.obstacle_below_tip_mm)
         agrees = None
-        if theirs is not None:
+        if theirs is not None and trial.complete:
             agrees = (
                 abs(theirs.descent_mm - trial.descent_mm) < 0.5 and theirs.contact == trial.touched
             )

@@ -240,6 +240,7 @@ function buildScene() {
     box.innerHTML = "<p class='note' style='padding:30px'>This log holds no shape of the robot to draw.</p>";
     return;
   }
+  if (box.querySelector(".note")) box.innerHTML = "";
   const of = trial, shape = shapeAt(trial.motion, now), d = dynamicTraces(shape);
   const still = [...tubeTraces(trial.tube, run.floor_mm), ...cubeTraces(trial.cube)];
   const traces = [
