@@ -180,6 +180,19 @@ def test_a_broken_configuration(
     assert words in error_of(capsys, "info", "--sim", "--config", str(path))
 
 
+def test_doctor_goes_on_after_what_is_wrong_and_exits_with_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("[motion]\nslew_mm_s = -1\n")
+    with pytest.raises(SystemExit) as ended:
+        main(["doctor", "--sim", "--config", str(path)])
+    assert ended.value.code == 1
+    printed = capsys.readouterr().out
+    assert "[motion] slew_mm_s" in printed
+    assert "ok  simulator" in printed
+
+
 def test_a_configuration_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
     assert "no-such.toml" in error_of(capsys, "info", "--sim", "--config", "no-such.toml")
 

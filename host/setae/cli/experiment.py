@@ -119,7 +119,7 @@ def explore(
         ]
         raise
     _print_table(results, paper=list(obstacles) == list(paper_obstacles(config)))
-    console.print(f"Logs: {folder}", soft_wrap=True)
+    console.print(f"Logs: {folder}", markup=False, soft_wrap=True)
     if report:
         _report(logs, folder)
 
@@ -137,9 +137,9 @@ def _report(logs: Sequence[Path], folder: Path) -> None:
         path = report.write(logs, folder / "report.html")
     except ExtraMissingError as error:
         # The experiment itself is done, and `setae report` can follow.
-        console.print(f"No report: {error}", style="yellow", soft_wrap=True)
+        console.print(f"No report: {error}", style="yellow", markup=False, soft_wrap=True)
         return
-    console.print(f"Report: {path}", soft_wrap=True)
+    console.print(f"Report: {path}", markup=False, soft_wrap=True)
 
 
 def _obstacles(

@@ -35,7 +35,7 @@ def flash(*, port: str | None = None, hex_file: Path | None = None) -> None:
     tool, folder = _tool(hex_file)
     port = port or rig.find_port()
     command = [part.replace("{port}", port) for part in tool]
-    console.print(f"Running: {' '.join(command)}", soft_wrap=True)
+    console.print(f"Running: {' '.join(command)}", markup=False, soft_wrap=True)
     try:
         done = subprocess.run(command, cwd=folder, timeout=_TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired as error:

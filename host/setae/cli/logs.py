@@ -25,7 +25,7 @@ def report(log: Path, *more: Path, out: Path | None = None) -> None:
     from setae import report as pages
 
     path = pages.write([log, *more], out or log.with_name("report.html"))
-    console.print(f"Report: {path}", soft_wrap=True)
+    console.print(f"Report: {path}", markup=False, soft_wrap=True)
 
 
 @app.command
@@ -53,4 +53,4 @@ def replay(log: Path, *, topic: str | None = None) -> None:
         text = " ".join(f"{key}={value}" for key, value in fields.items())
         console.print(f"{time_us / 1e6:10.3f} s  {name:<12} {text}", markup=False, soft_wrap=True)
     if read.damage is not None:
-        console.print(f"Damaged: {read.damage}", style="yellow", soft_wrap=True)
+        console.print(f"Damaged: {read.damage}", style="yellow", markup=False, soft_wrap=True)

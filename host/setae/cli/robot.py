@@ -10,6 +10,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 from cyclopts import Parameter
+from rich.markup import escape
 from rich.table import Table
 
 import setae
@@ -33,7 +34,7 @@ def ports() -> None:
         return
     table = Table("port", "what", "board?")
     for port in found:
-        table.add_row(port.device, port.description, "yes" if port.likely else "")
+        table.add_row(port.device, escape(port.description), "yes" if port.likely else "")
     console.print(table)
 
 
@@ -59,7 +60,7 @@ def info(*, where: Where | None = None) -> None:
             "limits": f"as configured (crc {reply.limits_crc:08x} at connect)",
         }
     for name, value in rows.items():
-        console.print(f"{name:<11} {value}", soft_wrap=True)
+        console.print(f"{name:<11} {value}", markup=False, soft_wrap=True)
 
 
 @app.command
@@ -214,11 +215,11 @@ class _Checks:
             self.bad(name, str(error))
 
     def good(self, name: str, text: str) -> None:
-        console.print(f"[green]ok [/] {name:<14} {text}", soft_wrap=True)
+        console.print(f"[green]ok [/] {name:<14} {escape(text)}", soft_wrap=True)
 
     def bad(self, name: str, text: str) -> None:
         self.failed = True
-        console.print(f"[red]bad[/] {name:<14} {text}", soft_wrap=True)
+        console.print(f"[red]bad[/] {name:<14} {escape(text)}", soft_wrap=True)
 
 
 def _describe(where: Where) -> str:
