@@ -105,7 +105,9 @@ def frame_overhead() -> Iterable[Figure]:
 
 def firmware_size() -> Iterable[Figure]:
     """How much of the UNO the firmware takes."""
-    if not ELF.is_file():
+    sources = [path for path in (ROOT / "firmware").rglob("*") if path.suffix in (".cpp", ".h")]
+    changed_at = max(path.stat().st_mtime for path in sources)
+    if not ELF.is_file() or ELF.stat().st_mtime < changed_at:
         subprocess.run(
             [str(ROOT / ".ci" / "platformio" / "pio"), "run", "-e", "uno"], cwd=ROOT, check=True
         )
