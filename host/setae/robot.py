@@ -66,7 +66,6 @@ _TARE_ATTEMPTS = 4
 _TARE_S = 0.5
 _RETRIED = (Refusal.TARE_NOISY, Refusal.TARE_FAR)
 _GUARD_FRAMES_MAX = 0xFFFF
-_LONG_MOTION_FRAMES = 20
 
 # Half a second of work, and the same for every robot of a configuration.
 _board_limits = lru_cache(maxsize=8)(servo.board_limits)
@@ -684,9 +683,7 @@ class Robot:
         motion = trajectory.line(
             self.lengths_mm, lengths_mm, max_speed_mm_s=limit, duration_s=duration_s
         )
-        # Two frames a segment halve the traffic; the straight line between is within a tick.
-        frames_each = 2 if motion.frames >= _LONG_MOTION_FRAMES else 1
-        segments = self._servos.segments(motion.lengths_mm, frames_each=frames_each)
+        segments = self._servos.segments(motion.lengths_mm)
         return list(segments), motion.duration_s
 
     # ------------------------------------------------------------------- details
