@@ -1,0 +1,198 @@
+"""Reliable commands: out in order, sent again until the board has taken them (go-back-N)."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from setae.errors import LinkLostError
+from setae.link.arrivals import Arrivals
+from setae.link.counts import Statistics
+from setae.link.events import Ticket, TicketState
+from setae.link.outbox import Outbox
+from setae.link.records import Records
+from setae.link.retransmission import RetransmissionTimer
+from setae.link.verdicts import Verdicts
+from setae_protocol.messages import (
+    WINDOW_FRAMES,
+    BoardHeader,
+    GuardMessage,
+    Resume,
+    Segments,
+)
+
+__all__ = ["ReliableSender"]
+
+_TRIES_MAX: Final = 20
+
+
+@dataclass(slots=True)
+class _InFlight:
+    ticket: Ticket
+    sequence: int
+    first_sent_us: int
+    gaps_when_sent: int
+    transmissions: int = 1
+
+
+class ReliableSender:
+    """The queue of commands, and the window of those that are on their way.
+
+    Attributes
+    ----------
+    timer
+        Round trip and timeout.
+    board_credit
+        Segments that the board has room for after all commands it has taken.
+    """
+
+    def __init__(
+        self,
+        outbox: Outbox,
+        arrivals: Arrivals,
+        records: Records,
+        verdicts: Verdicts,
+        statistics: Statistics,
+    ) -> None:
+        self.timer = RetransmissionTimer()
+        self.board_credit = 0
+        self._outbox = outbox
+        self._arrivals = arrivals
+        self._records = records
+        self._verdicts = verdicts
+        self._statistics = statistics
+        self._queue: deque[Ticket] = deque()
+        self._flight: deque[_InFlight] = deque()
+        self._next_sequence = 0
+        self._tries = 0
+        self._timeout_at_us = 0
+        self._resent_at_us: int | None = None
+
+    @property
+    def credit(self) -> int:
+        """Segments that the board has room for, less those on their way."""
+        on_their_way = sum(
+            item.ticket.message.count
+            for item in self._flight
+            if isinstance(item.ticket.message, Segments)
+        )
+        return self.board_credit - on_their_way
+
+    @property
+    def next_deadline_us(self) -> int | None:
+        """When `poll` has something to do, or None."""
+        return self._timeout_at_us if self._flight else None
+
+    # -------------------------------------------------------------------------- sending
+
+    def queue(self, ticket: Ticket) -> None:
+        """Put a command behind those that wait; `pump` sends it."""
+        self._queue.append(ticket)
+
+    def pump(self, now_us: int) -> None:
+        """Send queued commands as far as the window and the board's queue allow."""
+        while self._queue and len(self._flight) < WINDOW_FRAMES:
+            message = self._queue[0].message
+            if isinstance(message, Segments) and self.credit < message.count:
+                return
+            ticket = self._queue.popleft()
+            item = _InFlight(ticket, self._next_sequence, now_us, self._arrivals.gaps)
+            ticket.sequence = item.sequence
+            ticket.state = TicketState.SENT
+            self._next_sequence = (self._next_sequence + 1) & 0xFF
+            if not self._flight:
+                self._timeout_at_us = now_us + self.timer.timeout_us
+            self._flight.append(item)
+            self._verdicts.remember(ticket)
+            self._transmit(item)
+
+    def poll(self, now_us: int) -> None:
+        """Send again what was not confirmed in time.
+
+        Raises
+        ------
+        LinkLostError
+            It was sent often enough.
+        """
+        if not self._flight or now_us < self._timeout_at_us:
+            return
+        self._tries += 1
+        if self._tries > _TRIES_MAX:
+            name = type(self._flight[0].ticket.message).__name__.lower()
+            raise LinkLostError(f"The board did not confirm `{name}` in {_TRIES_MAX} tries.")
+        self._statistics.timeouts += 1
+        self.timer.back_off()
+        self._retransmit(now_us)
+
+    def _transmit(self, item: _InFlight) -> None:
+        message = item.ticket.message
+        if isinstance(message, (Resume, GuardMessage)):
+            # The board refuses them while a record waits to be acknowledged.
+            self._records.acknowledge_again()
+        self._outbox.put(message, sequence=item.sequence)
+
+    def _retransmit(self, now_us: int) -> None:
+        for item in self._flight:
+            item.transmissions += 1
+            self._transmit(item)
+            self._statistics.frames_retransmitted += 1
+        self._resent_at_us = now_us
+        self._timeout_at_us = now_us + self.timer.timeout_us
+
+    # ------------------------------------------------------------------------ receiving
+
+    def on_header(self, header: BoardHeader, now_us: int) -> None:
+        """Take room and acknowledgement from a board frame that is newer than all before."""
+        self.board_credit = header.credit
+        if not self._flight:
+            return
+        confirmed = (header.expected - self._flight[0].sequence) & 0xFF
+        if not 0 < confirmed <= len(self._flight):
+            return
+        for _ in range(confirmed):
+            item = self._flight.popleft()
+            self._verdicts.acknowledged(
+                item.ticket, epoch=header.epoch, gaps_when_sent=item.gaps_when_sent
+            )
+        if item.transmissions == 1:  # Karn: nobody knows which of several was answered
+            self.timer.measure(now_us - item.first_sent_us)
+        self._tries = 0
+        self.timer.recover()
+        self._timeout_at_us = now_us + self.timer.timeout_us
+
+    def on_gap(self, now_us: int) -> None:
+        """The board says that a command is missing: send again, once per round trip."""
+        if not self._flight:
+            return
+        since = self._resent_at_us
+        if since is None or now_us - since >= self.timer.round_trip_us:
+            self._retransmit(now_us)
+
+    # ---------------------------------------------------------------------------- ends
+
+    def discard_stale(self, epoch: int) -> None:
+        """What was planned for an older epoch need not go out at all."""
+        for ticket in list(self._queue):
+            message = ticket.message
+            if isinstance(message, (Segments, GuardMessage)) and message.epoch != epoch:
+                self._discard(ticket, epoch)
+
+    def discard_at_stop(self, epoch: int) -> None:
+        """A stop ends this epoch: nothing that was planned for it may move the robot."""
+        for ticket in list(self._queue):
+            if isinstance(ticket.message, (Segments, GuardMessage, Resume)):
+                self._discard(ticket, epoch)
+
+    def _discard(self, ticket: Ticket, epoch: int) -> None:
+        self._queue.remove(ticket)
+        ticket.state = TicketState.DISCARDED
+        ticket.discarded_by_epoch = epoch
+
+    def fail(self) -> None:
+        """The link is gone."""
+        for ticket in [*self._queue, *(item.ticket for item in self._flight)]:
+            if not ticket.done:
+                ticket.state = TicketState.FAILED
+        self._queue.clear()
+        self._flight.clear()
