@@ -55,7 +55,7 @@ PULSE_TICKS_ABSOLUTE_MAX: Final = 5000
 """Compiled-in upper bound of every pulse (2500 us)."""
 ATTACH_INTERVAL_FRAMES: Final = 5
 """Servo frames between attaching one servo and the next: one start-up current at a time."""
-SCHEMA_HASH: Final = 0x00CB3030
+SCHEMA_HASH: Final = 0xD40C6864
 """CRC-32C of what host and board must agree on; compared in the handshake."""
 CRC_BYTES: Final = 4
 HOST_OVERHEAD_BYTES: Final = 9
@@ -1554,7 +1554,7 @@ class Telemetry:
         )
 
 
-_TRIP = struct.Struct("<2BIH2i16H")
+_TRIP = struct.Struct("<3BIH2i16H")
 
 
 @dataclass(frozen=True, slots=True)
@@ -1565,6 +1565,8 @@ class Trip:
     ----------
     record_id
         Raised with each trip; never 0.
+    session
+        The session in which it was latched; 0 where there was none.
     cause
         Why.
     sample_frame
@@ -1581,9 +1583,10 @@ class Trip:
 
     TYPE: ClassVar[MessageType] = MessageType.TRIP
     RELIABLE: ClassVar[bool] = False
-    SIZE: ClassVar[int] = 48
+    SIZE: ClassVar[int] = 49
 
     record_id: int
+    session: int
     cause: TripCause
     sample_frame: int
     sample_phase_us: int
@@ -1596,6 +1599,7 @@ class Trip:
         try:
             return _TRIP.pack(
                 self.record_id,
+                self.session,
                 self.cause,
                 self.sample_frame,
                 self.sample_phase_us,
@@ -1611,23 +1615,24 @@ class Trip:
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """Read exactly 48 bytes; ValueError for anything else."""
+        """Read exactly 49 bytes; ValueError for anything else."""
         try:
             v = _TRIP.unpack(data)
         except struct.error as error:
             raise ValueError(f"Trip: {error}") from None
         return cls(
             v[0],
-            TripCause(v[1]),
-            v[2],
+            v[1],
+            TripCause(v[2]),
             v[3],
             v[4],
             v[5],
-            (v[6:10], v[10:14], v[14:18], v[18:22]),
+            v[6],
+            (v[7:11], v[11:15], v[15:19], v[19:23]),
         )
 
 
-_FAULTMESSAGE = struct.Struct("<2B2I5H")
+_FAULTMESSAGE = struct.Struct("<3B2I5H")
 
 
 @dataclass(frozen=True, slots=True)
@@ -1638,6 +1643,8 @@ class FaultMessage:
     ----------
     record_id
         Raised with each fault; never 0.
+    session
+        The session in which it was latched; 0 where there was none.
     fault
         What is broken.
     detail
@@ -1652,9 +1659,10 @@ class FaultMessage:
 
     TYPE: ClassVar[MessageType] = MessageType.FAULT
     RELIABLE: ClassVar[bool] = False
-    SIZE: ClassVar[int] = 20
+    SIZE: ClassVar[int] = 21
 
     record_id: int
+    session: int
     fault: Fault
     detail: int
     frame: int
@@ -1666,6 +1674,7 @@ class FaultMessage:
         try:
             return _FAULTMESSAGE.pack(
                 self.record_id,
+                self.session,
                 self.fault,
                 self.detail,
                 self.frame,
@@ -1677,22 +1686,23 @@ class FaultMessage:
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """Read exactly 20 bytes; ValueError for anything else."""
+        """Read exactly 21 bytes; ValueError for anything else."""
         try:
             v = _FAULTMESSAGE.unpack(data)
         except struct.error as error:
             raise ValueError(f"FaultMessage: {error}") from None
         return cls(
             v[0],
-            Fault(v[1]),
-            v[2],
+            v[1],
+            Fault(v[2]),
             v[3],
             v[4],
-            v[5:9],
+            v[5],
+            v[6:10],
         )
 
 
-_REFUSALMESSAGE = struct.Struct("<5B2i")
+_REFUSALMESSAGE = struct.Struct("<6B2i")
 
 
 @dataclass(frozen=True, slots=True)
@@ -1703,6 +1713,8 @@ class RefusalMessage:
     ----------
     record_id
         Raised with each refusal; never 0.
+    session
+        The session in which it was latched; 0 where there was none.
     command_type
         Type of the refused command.
     command_sequence
@@ -1719,9 +1731,10 @@ class RefusalMessage:
 
     TYPE: ClassVar[MessageType] = MessageType.REFUSAL
     RELIABLE: ClassVar[bool] = False
-    SIZE: ClassVar[int] = 13
+    SIZE: ClassVar[int] = 14
 
     record_id: int
+    session: int
     command_type: int
     command_sequence: int
     reason: Refusal
@@ -1734,6 +1747,7 @@ class RefusalMessage:
         try:
             return _REFUSALMESSAGE.pack(
                 self.record_id,
+                self.session,
                 self.command_type,
                 self.command_sequence,
                 self.reason,
@@ -1746,7 +1760,7 @@ class RefusalMessage:
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """Read exactly 13 bytes; ValueError for anything else."""
+        """Read exactly 14 bytes; ValueError for anything else."""
         try:
             v = _REFUSALMESSAGE.unpack(data)
         except struct.error as error:
@@ -1755,10 +1769,11 @@ class RefusalMessage:
             v[0],
             v[1],
             v[2],
-            Refusal(v[3]),
-            v[4],
+            v[3],
+            Refusal(v[4]),
             v[5],
             v[6],
+            v[7],
         )
 
 

@@ -463,6 +463,7 @@ BOARD_MESSAGES = (
         "trip", 0x85,
         Struct(
             "record_id" / Int8ul * "Raised with each trip; never 0.",
+            "session" / Int8ul * "The session in which it was latched; 0 where there was none.",
             "cause" / Int8ul * "Why.",
             "sample_frame" / Int32ul * "Board time of the deciding sample.",
             "sample_phase_us" / Int16ul * "Board time of the deciding sample.",
@@ -477,6 +478,7 @@ BOARD_MESSAGES = (
         "fault", 0x86,
         Struct(
             "record_id" / Int8ul * "Raised with each fault; never 0.",
+            "session" / Int8ul * "The session in which it was latched; 0 where there was none.",
             "fault" / Int8ul * "What is broken.",
             "detail" / Int32ul * "A figure that depends on the fault.",
             "frame" / Int32ul * "Board time of the fault.",
@@ -490,6 +492,7 @@ BOARD_MESSAGES = (
         "refusal", 0x87,
         Struct(
             "record_id" / Int8ul * "Raised with each refusal; never 0.",
+            "session" / Int8ul * "The session in which it was latched; 0 where there was none.",
             "command_type" / Int8ul * "Type of the refused command.",
             "command_sequence" / Int8ul * "Its sequence number.",
             "reason" / Int8ul * "Why.",

@@ -20,6 +20,7 @@ def record(positions_mm: list[tuple[float, float, float]], *, change_hpa: float 
     history = tuple(tuple(int(tick) for tick in row) for row in ServoModel(CONFIG).ticks(lengths))
     return Trip(
         record_id=1,
+        session=7,
         cause=TripCause.CONTACT,
         sample_frame=100,
         sample_phase_us=10_000,

@@ -282,8 +282,8 @@ class Engine:
             if fresh and message.gap:
                 self._reliable.on_gap(now_us)
         elif isinstance(message, (Trip, FaultMessage, RefusalMessage)):
-            earlier = self.phase is Phase.SETTLING
-            event = self._records.receive(message, now_us, earlier=earlier)
+            settling = self.phase is Phase.SETTLING
+            event = self._records.receive(message, now_us, settling=settling)
             if event is not None:
                 self._events.append(event)
         elif isinstance(message, Pong):

@@ -52,10 +52,12 @@ class Records:
             if ids:
                 self._outbox.put(Acknowledge(record=record, record_id=ids[-1]))
 
-    def receive(self, message: RecordMessage, now_us: int, *, earlier: bool) -> Event | None:
+    def receive(self, message: RecordMessage, now_us: int, *, settling: bool) -> Event | None:
         """Take one copy of a record; return what there is to tell."""
         if message.record_id == 0:
             return None  # an empty latch
+        # While settling even where the session's number was used before.
+        earlier = settling or message.session != self._outbox.session
         kind = _LATCH[type(message)]
         # Each time: the last acknowledgement may have been lost.
         self._outbox.put(Acknowledge(record=kind, record_id=message.record_id))

@@ -40,8 +40,9 @@ TEST_CASE("a record is repeated until its own id is acknowledged, and can be rec
   Latch<protocol::FaultMessage> latch;
   latch.recall();
   CHECK_FALSE(latch.wanted(true));  // there is nothing yet
-  latch.set({});
+  latch.set({}, 9);
   CHECK(latch.record().record_id == 1);
+  CHECK(latch.record().session == 9);
   CHECK(latch.wanted(true));
   CHECK_FALSE(latch.wanted(false));
   latch.sent();
@@ -68,9 +69,9 @@ TEST_CASE("a record is repeated until its own id is acknowledged, and can be rec
 TEST_CASE("record ids skip 0 when they wrap") {
   Latch<protocol::FaultMessage> latch;
   for (int i = 0; i < 255; ++i)
-    latch.set({});
+    latch.set({}, 9);
   CHECK(latch.record().record_id == 255);
-  latch.set({});
+  latch.set({}, 9);
   CHECK(latch.record().record_id == 1);
 }
 

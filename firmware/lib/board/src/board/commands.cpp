@@ -156,7 +156,7 @@ void Board::refuse(MessageType type, uint8_t sequence, const Verdict& verdict) {
   record.index = verdict.index;
   record.value = verdict.value;
   record.limit = verdict.limit;
-  refusal_.set(record);
+  refusal_.set(record, session_.id());
 
   if (type != MessageType::kSegments && type != MessageType::kGuard)
     return;

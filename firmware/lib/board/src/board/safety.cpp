@@ -125,7 +125,7 @@ void Board::trip(TripCause cause) {
       record.pulse_ticks[frame][i] = history_[frame].ticks[i];
     }
   }
-  trip_.set(record);
+  trip_.set(record, session_.id());
 }
 
 void Board::fault(Fault fault, uint32_t detail) {
@@ -139,7 +139,7 @@ void Board::fault(Fault fault, uint32_t detail) {
   record.phase_us = now_.phase_us;
   for (uint8_t i = 0; i < protocol::kServos; ++i)
     record.pulse_ticks[i] = current_.ticks[i];
-  fault_.set(record);
+  fault_.set(record, session_.id());
 }
 
 bool Board::sensor_fault_persists() const {

@@ -7,7 +7,7 @@
 
 namespace setae {
 
-// Record: a message with a `record_id`.
+// Record: a message with a `record_id` and a `session`.
 template <typename Record>
 class Latch {
  public:
@@ -16,10 +16,11 @@ class Latch {
   const Record& record() const { return record_; }
 
   // The newest wins; that the id then rises by more than one shows the host what it missed.
-  void set(const Record& record) {
+  void set(const Record& record, uint8_t session) {
     const uint8_t id = record_.record_id == 255 ? 1 : record_.record_id + 1;
     record_ = record;
     record_.record_id = id;
+    record_.session = session;
     pending_ = true;
     repeat_ = true;
     age_frames_ = 0;

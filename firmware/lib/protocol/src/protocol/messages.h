@@ -50,12 +50,12 @@ constexpr uint16_t kPulseTicksAbsoluteMax = 5000;
 // Servo frames between attaching one servo and the next: one start-up current at a time.
 constexpr uint8_t kAttachIntervalFrames = 5;
 // CRC-32C of what host and board must agree on; they compare it in the handshake.
-constexpr uint32_t kSchemaHash = 0x00CB3030;
+constexpr uint32_t kSchemaHash = 0xD40C6864;
 // CRC, COBS code byte and delimiter: what a frame has besides header and payload.
 constexpr uint8_t kCrcBytes = 4;
 constexpr uint8_t kStuffingBytes = 2;
 constexpr uint8_t kHostPayloadMax = 52;
-constexpr uint8_t kBoardPayloadMax = 48;
+constexpr uint8_t kBoardPayloadMax = 49;
 
 // What the board is doing; in the header of every board frame.
 enum class State : uint8_t {
@@ -893,10 +893,12 @@ inline void decode(const uint8_t* in, Telemetry& message) {
 // Latched record of a trip.
 struct Trip {
   static constexpr MessageType kType = MessageType::kTrip;
-  static constexpr uint8_t kSize = 48;
+  static constexpr uint8_t kSize = 49;
 
   // Raised with each trip; never 0.
   uint8_t record_id;
+  // The session in which it was latched; 0 where there was none.
+  uint8_t session;
   // Why. (TripCause)
   uint8_t cause;
   // Board time of the deciding sample.
@@ -913,27 +915,29 @@ struct Trip {
 
 inline void encode(const Trip& message, uint8_t* out) {
   detail::put8(message.record_id, out);
-  detail::put8(message.cause, out + 1);
-  detail::put32(message.sample_frame, out + 2);
-  detail::put16(message.sample_phase_us, out + 6);
-  detail::put32(static_cast<uint32_t>(message.pressure_raw), out + 8);
-  detail::put32(static_cast<uint32_t>(message.baseline_raw), out + 12);
+  detail::put8(message.session, out + 1);
+  detail::put8(message.cause, out + 2);
+  detail::put32(message.sample_frame, out + 3);
+  detail::put16(message.sample_phase_us, out + 7);
+  detail::put32(static_cast<uint32_t>(message.pressure_raw), out + 9);
+  detail::put32(static_cast<uint32_t>(message.baseline_raw), out + 13);
   for (uint8_t i = 0; i < 4; ++i) {
     for (uint8_t j = 0; j < 4; ++j) {
-      detail::put16(message.pulse_ticks[i][j], out + 16 + i * 8 + j * 2);
+      detail::put16(message.pulse_ticks[i][j], out + 17 + i * 8 + j * 2);
     }
   }
 }
 inline void decode(const uint8_t* in, Trip& message) {
   message.record_id = detail::get8(in);
-  message.cause = detail::get8(in + 1);
-  message.sample_frame = detail::get32(in + 2);
-  message.sample_phase_us = detail::get16(in + 6);
-  message.pressure_raw = static_cast<int32_t>(detail::get32(in + 8));
-  message.baseline_raw = static_cast<int32_t>(detail::get32(in + 12));
+  message.session = detail::get8(in + 1);
+  message.cause = detail::get8(in + 2);
+  message.sample_frame = detail::get32(in + 3);
+  message.sample_phase_us = detail::get16(in + 7);
+  message.pressure_raw = static_cast<int32_t>(detail::get32(in + 9));
+  message.baseline_raw = static_cast<int32_t>(detail::get32(in + 13));
   for (uint8_t i = 0; i < 4; ++i) {
     for (uint8_t j = 0; j < 4; ++j) {
-      message.pulse_ticks[i][j] = detail::get16(in + 16 + i * 8 + j * 2);
+      message.pulse_ticks[i][j] = detail::get16(in + 17 + i * 8 + j * 2);
     }
   }
 }
@@ -941,10 +945,12 @@ inline void decode(const uint8_t* in, Trip& message) {
 // Latched record of a fault.
 struct FaultMessage {
   static constexpr MessageType kType = MessageType::kFault;
-  static constexpr uint8_t kSize = 20;
+  static constexpr uint8_t kSize = 21;
 
   // Raised with each fault; never 0.
   uint8_t record_id;
+  // The session in which it was latched; 0 where there was none.
+  uint8_t session;
   // What is broken. (Fault)
   uint8_t fault;
   // A figure that depends on the fault.
@@ -959,32 +965,36 @@ struct FaultMessage {
 
 inline void encode(const FaultMessage& message, uint8_t* out) {
   detail::put8(message.record_id, out);
-  detail::put8(message.fault, out + 1);
-  detail::put32(message.detail, out + 2);
-  detail::put32(message.frame, out + 6);
-  detail::put16(message.phase_us, out + 10);
+  detail::put8(message.session, out + 1);
+  detail::put8(message.fault, out + 2);
+  detail::put32(message.detail, out + 3);
+  detail::put32(message.frame, out + 7);
+  detail::put16(message.phase_us, out + 11);
   for (uint8_t i = 0; i < 4; ++i) {
-    detail::put16(message.pulse_ticks[i], out + 12 + i * 2);
+    detail::put16(message.pulse_ticks[i], out + 13 + i * 2);
   }
 }
 inline void decode(const uint8_t* in, FaultMessage& message) {
   message.record_id = detail::get8(in);
-  message.fault = detail::get8(in + 1);
-  message.detail = detail::get32(in + 2);
-  message.frame = detail::get32(in + 6);
-  message.phase_us = detail::get16(in + 10);
+  message.session = detail::get8(in + 1);
+  message.fault = detail::get8(in + 2);
+  message.detail = detail::get32(in + 3);
+  message.frame = detail::get32(in + 7);
+  message.phase_us = detail::get16(in + 11);
   for (uint8_t i = 0; i < 4; ++i) {
-    message.pulse_ticks[i] = detail::get16(in + 12 + i * 2);
+    message.pulse_ticks[i] = detail::get16(in + 13 + i * 2);
   }
 }
 
 // Latched record of a refused command.
 struct RefusalMessage {
   static constexpr MessageType kType = MessageType::kRefusal;
-  static constexpr uint8_t kSize = 13;
+  static constexpr uint8_t kSize = 14;
 
   // Raised with each refusal; never 0.
   uint8_t record_id;
+  // The session in which it was latched; 0 where there was none.
+  uint8_t session;
   // Type of the refused command.
   uint8_t command_type;
   // Its sequence number.
@@ -1001,21 +1011,23 @@ struct RefusalMessage {
 
 inline void encode(const RefusalMessage& message, uint8_t* out) {
   detail::put8(message.record_id, out);
-  detail::put8(message.command_type, out + 1);
-  detail::put8(message.command_sequence, out + 2);
-  detail::put8(message.reason, out + 3);
-  detail::put8(message.index, out + 4);
-  detail::put32(static_cast<uint32_t>(message.value), out + 5);
-  detail::put32(static_cast<uint32_t>(message.limit), out + 9);
+  detail::put8(message.session, out + 1);
+  detail::put8(message.command_type, out + 2);
+  detail::put8(message.command_sequence, out + 3);
+  detail::put8(message.reason, out + 4);
+  detail::put8(message.index, out + 5);
+  detail::put32(static_cast<uint32_t>(message.value), out + 6);
+  detail::put32(static_cast<uint32_t>(message.limit), out + 10);
 }
 inline void decode(const uint8_t* in, RefusalMessage& message) {
   message.record_id = detail::get8(in);
-  message.command_type = detail::get8(in + 1);
-  message.command_sequence = detail::get8(in + 2);
-  message.reason = detail::get8(in + 3);
-  message.index = detail::get8(in + 4);
-  message.value = static_cast<int32_t>(detail::get32(in + 5));
-  message.limit = static_cast<int32_t>(detail::get32(in + 9));
+  message.session = detail::get8(in + 1);
+  message.command_type = detail::get8(in + 2);
+  message.command_sequence = detail::get8(in + 3);
+  message.reason = detail::get8(in + 4);
+  message.index = detail::get8(in + 5);
+  message.value = static_cast<int32_t>(detail::get32(in + 6));
+  message.limit = static_cast<int32_t>(detail::get32(in + 10));
 }
 
 // Answer to read_limits: the limits in force.
