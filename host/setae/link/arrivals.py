@@ -42,7 +42,7 @@ class Arrivals:
         if not silent and (step == 0 or step >= 128):
             self._statistics.frames_late += 1
             return False
-        if step != 1:
+        if step != 1 or silent:  # after a silence 257 lost frames look like none
             self._statistics.frames_lost += (step - 1) & 0xFF
             self.gaps += 1
         self._last_sequence = sequence

@@ -63,7 +63,7 @@ class Handshake:
         self._timing = timing
         self._wanted_session = 0
         self._hello_token: int | None = None
-        self._settle_token: int | None = None
+        self._settle_tokens: set[int] = set()
         self._settle_answered = False
         self._repeat_at_us = 0
         self._probe_at_us = 0
@@ -165,8 +165,8 @@ class Handshake:
         return False
 
     def on_pong(self, token: int) -> None:
-        """Take a pong; it follows the answers to all that was asked before it."""
-        if self.phase is Phase.SETTLING and token == self._settle_token:
+        """Take a pong: the board has got what was asked before it, whichever repeat that was."""
+        if token in self._settle_tokens:
             self._settle_answered = True
 
     def finish(self) -> None:
@@ -195,7 +195,7 @@ class Handshake:
         """Ask for what was latched before, so that it isn't taken for this session's."""
         for record in Record:
             self._outbox.put(Recall(record=record))
-        self._settle_token = self._timing.ping(now_us)
+        self._settle_tokens.add(self._timing.ping(now_us))
         self._repeat_at_us = now_us + _SETTLE_REPEAT_US
 
 

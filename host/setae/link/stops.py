@@ -57,8 +57,14 @@ class Stops:
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
         """Look whether the board shows our stop."""
+        first = self._shown_number is None
         self._shown_number = telemetry.stop_number
-        if self._tickets and telemetry.stop_number == self._number:
+        if not self._tickets or telemetry.stop_number != self._number:
+            return
+        if first:
+            # It may be the number of an earlier session's stop.
+            self._raise_number()
+        else:
             self.confirm()
 
     def confirm(self) -> None:
@@ -75,10 +81,10 @@ class Stops:
         self._tickets.clear()
 
     def _raise_number(self) -> None:
-        last = self._number
-        if not self._tickets and self._shown_number is not None:
-            last = self._shown_number
-        self._number = (last + 1) & 0xFF
+        """Take a number that was not ours yet, and that the board does not show."""
+        self._number = (self._number + 1) & 0xFF
+        if self._number == self._shown_number:
+            self._number = (self._number + 1) & 0xFF
 
     def _send(self, now_us: int) -> None:
         self._outbox.put_first(Stop(stop_number=self._number))

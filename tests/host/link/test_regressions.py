@@ -1,0 +1,170 @@
+"""Each test opens with what went wrong once."""
+
+from __future__ import annotations
+
+import pytest
+from tests.host.link.model import (
+    POSE,
+    SECOND_US,
+    ModelTransport,
+    record_events,
+    segments,
+)
+
+from setae.errors import DeadlineError
+from setae.link.events import FaultReported, Refused, TicketState, Tripped
+from setae.link.handshake import Phase
+from setae.link.session import Session
+from setae_protocol.frame import HostDecoder, encode_host
+from setae_protocol.messages import (
+    BoardMessage,
+    Enable,
+    Fault,
+    MessageType,
+    Recall,
+    Record,
+    Refusal,
+    RefusalMessage,
+    Resume,
+    State,
+    Stop,
+)
+
+
+class WithoutRecall(ModelTransport):
+    """A line that loses every `recall`."""
+
+    def send(self, data: bytes) -> None:
+        kept = b""
+        for wire in data.split(b"\0")[:-1]:
+            frames = HostDecoder().feed(wire + b"\0")
+            if not (frames and isinstance(frames[0].message, Recall)):
+                kept += wire + b"\0"
+        super().send(kept)
+
+
+def test_a_slow_line_opens_a_session() -> None:
+    """The handshake took the answer to its latest ping only, and sent one every 50 ms.
+
+    So a line on which an answer takes longer than that never opened.
+    """
+    line = ModelTransport()
+    line.delay_us = 60_000
+    session = Session(line, session_id=7)
+    session.open(3 * SECOND_US)
+    assert session.request(Enable(pulse_ticks=POSE)).state is TicketState.EXECUTED
+
+
+def test_an_earlier_hosts_refusal_is_no_verdict_on_our_command() -> None:
+    """Where the recall was lost, the refusal's repeat came after the session was open.
+
+    It named the first command's type and number, and a command that the board
+    had carried out counted as refused.
+    """
+    line = WithoutRecall()
+    line.board.session = 9
+    line.board.latch(
+        Record.REFUSAL,
+        lambda i: RefusalMessage(
+            record_id=i, session=9, command_type=MessageType.ENABLE, command_sequence=0,
+            reason=Refusal.BUSY, index=255, value=0, limit=0,
+        ),
+    )  # fmt: skip
+    session = Session(line, session_id=7)
+    events = record_events(session)
+    session.open()
+    assert session.request(Enable(pulse_ticks=POSE)).state is TicketState.EXECUTED
+    session.run_for(SECOND_US)
+    told = [event for event in events if isinstance(event, Refused)]
+    assert [(event.earlier, event.ticket) for event in told] == [(True, None)]
+    assert line.board.executed == [Enable(pulse_ticks=POSE)]
+
+
+def test_an_earlier_hosts_trip_and_fault_are_told_as_earlier_though_the_recall_was_lost() -> None:
+    """They came as this session's own, and ended its first motion with an error."""
+    line = WithoutRecall()
+    line.board.session = 9
+    line.board.trip()
+    line.board.fault(Fault.SENSOR_SILENT)
+    session = Session(line, session_id=7)
+    events = record_events(session)
+    session.open()
+    session.run_for(SECOND_US)
+    told = [event for event in events if isinstance(event, (Tripped, FaultReported))]
+    assert len(told) == 2
+    assert all(event.earlier for event in told)
+
+
+def test_an_earlier_hosts_stop_does_not_confirm_ours() -> None:
+    """Telemetry shows the last stop's number, even where it was another session's.
+
+    A stop before the first telemetry had the same number: it counted as carried
+    out, was not repeated, and the robot went on where its only copy was lost.
+    """
+    line = ModelTransport()
+    line.board.session, line.board.stop_number = 9, 1
+    session = Session(line, session_id=7)
+    session.engine.open(7, line.now_us())
+    # The first telemetry has left the board, and arrives after the stop went out.
+    with pytest.raises(DeadlineError):
+        session.run_until(lambda: False, 20_500)
+    assert session.engine.phase is Phase.SETTLING
+    stops_before = line.board.stops
+    line.deaf = True
+    ticket = session.send_stop()
+    session.run_for(5_000)
+    line.deaf = False
+    session.run_until(lambda: ticket.done, SECOND_US)
+    assert line.board.stops > stops_before
+    assert line.board.state is State.STOPPED
+
+
+def test_a_stop_takes_no_number_that_an_older_copy_may_carry() -> None:
+    """The next number was the one after telemetry's.
+
+    Late copies of stops 1 and 2 made the board show 1, and then know 2 as the
+    last again. The third stop was sent as 2, and the board did not act on it.
+    """
+    line = ModelTransport()
+    session = Session(line, session_id=7)
+    session.open()
+    session.request(Enable(pulse_ticks=POSE))
+    copies = []
+    for _ in range(2):
+        session.stop()
+        assert line.board.stop_number is not None
+        copies.append(encode_host(Stop(stop_number=line.board.stop_number), session=7))
+        session.request(Resume(epoch=session.epoch))
+    line.board.receive(copies[0])
+    session.run_for(50_000)
+    line.board.receive(copies[1])
+    # The host's newest telemetry is from before the second copy; somebody resumed meanwhile.
+    line.board.state = State.MOVING
+    session.stop()
+    assert line.board.state is State.STOPPED
+
+
+def test_256_lost_frames_are_a_loss(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Board frames are numbered modulo 256: after 256 lost ones the next looks like the next.
+
+    The refusal was among them, and the command counted as carried out.
+    """
+    line = ModelTransport()
+    session = Session(line, session_id=7)
+    session.open()
+    ticket = session.send(segments(session))  # refused: not enabled
+    line.receive(line.now_us() + 100)
+    say = line.board.say
+    unheard = 0
+
+    def swallow(message: BoardMessage) -> None:
+        nonlocal unheard
+        unheard += 1
+        line.board.sequence = (line.board.sequence + 1) & 0xFF
+
+    monkeypatch.setattr(line.board, "say", swallow)
+    session.run_for(2 * SECOND_US)
+    line.board.sequence = (line.board.sequence + 256 - unheard) & 0xFF
+    monkeypatch.setattr(line.board, "say", say)
+    session.run_until(lambda: ticket.done, SECOND_US)
+    assert ticket.state is TicketState.REFUSED
