@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from setae.errors import InputError
 
-__all__ = ["Arc", "FloatArray", "finite_array", "sinc"]
+__all__ = ["Arc", "FloatArray", "finite_array", "real_array", "sinc", "sinc_slope"]
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -58,26 +58,33 @@ def finite_array(
     ...
     setae.errors.InputError: position_mm has shape (2,). Its last axis must have 3 entries: x, y, z.
     """
+    array = real_array(name, value, last_axis=last_axis, what=what).astype(np.float64)
+    bad = ~np.isfinite(array)
+    if bad.any():
+        raise InputError(f"{name}{first_place(bad)} is {array[bad][0]}.", "Pass finite numbers.")
+    return array
+
+
+def real_array(
+    name: str, value: npt.ArrayLike, *, last_axis: int | None = None, what: str = ""
+) -> npt.NDArray[Any]:
+    """Like `finite_array`, but in the type that the numbers have, and not a copy if need be."""
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "iuf":
             raise TypeError
-        array = raw.astype(np.float64)
     except (TypeError, ValueError):
         raise InputError(
             f"{name} is not an array of real numbers: {_short(value)}.",
             "Pass numbers, all rows of the same length.",
         ) from None
-    if last_axis is not None and (array.ndim == 0 or array.shape[-1] != last_axis):
+    if last_axis is not None and (raw.ndim == 0 or raw.shape[-1] != last_axis):
         entries = f"{last_axis} entries" if last_axis != 1 else "one entry"
         raise InputError(
-            f"{name} has shape {array.shape}.",
+            f"{name} has shape {raw.shape}.",
             f"Its last axis must have {entries}{': ' + what if what else ''}.",
         )
-    bad = ~np.isfinite(array)
-    if bad.any():
-        raise InputError(f"{name}{first_place(bad)} is {array[bad][0]}.", "Pass finite numbers.")
-    return array
+    return raw
 
 
 def first_place(bad: npt.NDArray[np.bool_]) -> str:
@@ -101,6 +108,25 @@ def sinc(angle_rad: npt.ArrayLike) -> FloatArray:
     array([1., 1.])
     """
     return np.asarray(np.sinc(np.asarray(angle_rad, dtype=np.float64) / math.pi))
+
+
+def sinc_slope(angle_rad: npt.ArrayLike) -> FloatArray:
+    """Derivative of `sinc` over its argument, with its limit -1/3 at 0.
+
+    So sinc(c|Δ|) has the derivative c² · slope · Δ by a vector Δ.
+
+    Examples
+    --------
+    >>> sinc_slope([0.0, 1e-9])
+    array([-0.33333333, -0.33333333])
+    """
+    x = np.asarray(angle_rad, dtype=np.float64)
+    square = x * x
+    # The quotient loses its digits near 0, the series doesn't.
+    near = square < 0.01
+    quotient = (np.cos(x) - sinc(x)) / np.where(near, 1.0, square)
+    series = -1 / 3 + square * (1 / 30 - square * (1 / 840 - square * (1 / 45360)))
+    return np.asarray(np.where(near, series, quotient))
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -147,14 +173,22 @@ class Arc:
                 f"length_mm has shape {length.shape} and bend_rad {bend.shape}.",
                 "The shape of bend_rad must be that of length_mm, and (2,).",
             ) from None
-        length, bend = (
-            np.array(np.broadcast_to(length, shape)),
-            np.array(np.broadcast_to(bend, (*shape, 2))),
+        self._keep(
+            np.array(np.broadcast_to(length, shape)), np.array(np.broadcast_to(bend, (*shape, 2)))
         )
+
+    def _keep(self, length: FloatArray, bend: FloatArray) -> None:
         length.flags.writeable = False
         bend.flags.writeable = False
         object.__setattr__(self, "length_mm", length)
         object.__setattr__(self, "bend_rad", bend)
+
+    @classmethod
+    def of_checked(cls, length_mm: FloatArray, bend_rad: FloatArray) -> Arc:
+        """An arc of arrays that fulfil all that `Arc` asks for, and that nobody else holds."""
+        arc = cls.__new__(cls)
+        arc._keep(length_mm, bend_rad)
+        return arc
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -188,7 +222,9 @@ class Arc:
     def __getitem__(self, index: object) -> Arc:
         """Some of the poses, by an index into (...)."""
         key = index if isinstance(index, tuple) else (index,)
-        return Arc(length_mm=self.length_mm[key], bend_rad=self.bend_rad[(*key, slice(None))])
+        return Arc.of_checked(
+            np.array(self.length_mm[key]), np.array(self.bend_rad[(*key, slice(None))])
+        )
 
     @classmethod
     def from_angles(

@@ -12,7 +12,7 @@ import json
 import math
 import os
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 SERVOS = 4
-TENDON_MODELS = ("paper", "parallel")
+TENDON_MODELS = ("paper", "parallel", "taut")
 """Names that the key ``model`` may have; `setae.tendons` has a function for each."""
 
 
@@ -55,6 +55,8 @@ class _Key:
         A file's value times this is the field's.
     count
         Entries of a list: (fewest, most). None: a single value.
+    single
+        A single value will do where a list may stand.
     """
 
     low: float
@@ -63,6 +65,7 @@ class _Key:
     scale: float = 1.0
     integer: bool = False
     count: tuple[int, int] | None = None
+    single: bool = False
     choices: tuple[Any, ...] = ()
 
     def describe(self, name: str) -> str:
@@ -76,13 +79,17 @@ class _Key:
             return f"must be {what}"
         fewest, most = self.count
         number = str(fewest) if fewest == most else f"{fewest} to {most}"
+        if self.single:
+            return f"must be {what}, or a list of {number} of them"
         return f"must be a list of {number}, each {what}"
 
     def check(self, value: Any) -> Any:
         """The value in the field's own type; raises ValueError if it can't be."""
-        if self.count is None:
+        # An array of numpy without axes can't be iterated, though it looks as if it could.
+        one = not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0
+        if self.count is None or (self.single and one):
             return self._check_one(value)
-        if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
+        if isinstance(value, (str, bytes)) or one:
             raise ValueError
         entries = tuple(self._check_one(entry) for entry in value)
         if not self.count[0] <= len(entries) <= self.count[1]:
@@ -181,11 +188,14 @@ class Geometry(_Section):
     Attributes
     ----------
     tendon_radius_mm
-        Distance of the tendons from the spring's axis, the paper's d. The paper
-        doesn't state it: exactly 34 of its 63 targets are reachable, as it
-        reports, for 7.82 to 8.75 mm.
+        Distance of the tendons from the spring's axis, the paper's d: one for all, or
+        one each. The paper doesn't state it: exactly 34 of its 63 targets are
+        reachable, as it reports, for 7.82 to 8.75 mm.
     tendon_angles_rad
         Where each tendon sits, about frame D's z axis. Any number, any angles.
+    tendon_diameter_mm
+        Of the line; the model ``taut`` keeps half of it between the tendon's centre and
+        the spring's coils.
     free_length_mm, min_length_mm
         Effective length of the spring, relaxed and fully compressed.
     max_bend_rad
@@ -205,9 +215,13 @@ class Geometry(_Section):
     --------
     >>> Geometry(tendon_radius_mm=8.0).tendon_count
     4
+    >>> Geometry(tendon_radius_mm=[8.0, 8.0, 7.5, 8.0]).tendon_radii_mm
+    (8.0, 8.0, 7.5, 8.0)
     """
 
-    tendon_radius_mm: float = _key(8.3, low=0.1, high=500)
+    tendon_radius_mm: float | Sequence[float] = _key(
+        8.3, low=0.1, high=500, count=(1, 64), single=True
+    )
     tendon_angles_rad: tuple[float, ...] = _key(
         (0.0, math.pi / 2, math.pi, 1.5 * math.pi),
         low=-2 * math.pi,
@@ -216,6 +230,7 @@ class Geometry(_Section):
         scale=math.pi / 180,
         count=(1, 64),
     )
+    tendon_diameter_mm: float = _key(0.0, low=0, high=50)
     free_length_mm: float = _key(70.0, low=1, high=5000)
     min_length_mm: float = _key(20.0, low=0.1, high=5000)
     max_bend_rad: float = _key(
@@ -236,16 +251,35 @@ class Geometry(_Section):
         """Number of tendons."""
         return len(self.tendon_angles_rad)
 
+    @property
+    def tendon_radii_mm(self) -> tuple[float, ...]:
+        """Distance of each tendon from the spring's axis."""
+        if isinstance(self.tendon_radius_mm, Sequence):
+            return tuple(self.tendon_radius_mm)
+        return (self.tendon_radius_mm,) * self.tendon_count
+
+    @property
+    def lumen_radius_mm(self) -> float:
+        """How far from the spring's axis the centre of a tendon can get."""
+        return self.bore_radius_mm - self.tendon_diameter_mm / 2
+
     def _contradiction(self) -> str:
         if self.min_length_mm >= self.free_length_mm:
             return (
                 f"min_length_mm = {self.min_length_mm:g} must be below "
                 f"free_length_mm = {self.free_length_mm:g}."
             )
-        if self.tendon_radius_mm > self.bore_radius_mm:
+        if len(self.tendon_radii_mm) != self.tendon_count:
             return (
-                f"tendon_radius_mm = {self.tendon_radius_mm:g} must not exceed "
-                f"bore_radius_mm = {self.bore_radius_mm:g}: the tendons run inside the spring."
+                f"tendon_radius_mm has {len(self.tendon_radii_mm)} entries and tendon_angles_deg "
+                f"{self.tendon_count}: give one radius for all tendons, or one each."
+            )
+        if max(self.tendon_radii_mm) > self.lumen_radius_mm:
+            less = " less half of tendon_diameter_mm" if self.tendon_diameter_mm else ""
+            return (
+                f"tendon_radius_mm = {max(self.tendon_radii_mm):g} must not exceed "
+                f"bore_radius_mm{less} = {self.lumen_radius_mm:g}: the tendons run inside the "
+                "spring."
             )
         if 2 * self.bore_radius_mm >= self.spring_outer_diameter_mm:
             return (

@@ -74,15 +74,24 @@ MISTAKES = [
     ),
     (
         "[geometry]\ntendon_radius_mm = -8",
-        "my.toml: [geometry] tendon_radius_mm = -8: it must be a number of mm from 0.1 to 500.",
+        (
+            "my.toml: [geometry] tendon_radius_mm = -8: it must be a number of mm from 0.1 to "
+            "500, or a list of 1 to 64 of them."
+        ),
     ),
     (
         "[geometry]\ntendon_radius_mm = nan",
-        "my.toml: [geometry] tendon_radius_mm = NaN: it must be a number of mm from 0.1 to 500.",
+        (
+            "my.toml: [geometry] tendon_radius_mm = NaN: it must be a number of mm from 0.1 to "
+            "500, or a list of 1 to 64 of them."
+        ),
     ),
     (
         "[geometry]\ntendon_radius_mm = '8'",
-        'my.toml: [geometry] tendon_radius_mm = "8": it must be a number of mm from 0.1 to 500.',
+        (
+            'my.toml: [geometry] tendon_radius_mm = "8": it must be a number of mm from 0.1 to '
+            "500, or a list of 1 to 64 of them."
+        ),
     ),
     (
         "[geometry]\nmax_bend_deg = true",
@@ -159,7 +168,7 @@ MISTAKES = [
     ),
     (
         "[motion]\nmodel = 'papr'",
-        'my.toml: [motion] model = "papr": it must be one of "paper", "parallel".',
+        'my.toml: [motion] model = "papr": it must be one of "paper", "parallel", "taut".',
     ),
     (
         "[motion]\nretract_speed_mm_s = 200",

@@ -190,8 +190,8 @@ def test_bad_lengths_say_what_is_wrong() -> None:
         kinematics.forward([60, 60, -1, 60], GEOMETRY)
     with pytest.raises(InputError, match="three different angles"):
         kinematics.forward([60, 60], Geometry(tendon_angles_rad=(0, math.pi)))
-    with pytest.raises(InputError, match="There are: paper, parallel"):
-        kinematics.forward([60, 60, 60, 60], GEOMETRY, "taut")
+    with pytest.raises(InputError, match="There are: paper, parallel, taut"):
+        kinematics.forward([60, 60, 60, 60], GEOMETRY, "tight")
     with pytest.raises(InputError, match=r"near has shape \(2,\)"):
         kinematics.forward(
             [60, 60, 60, 60], GEOMETRY, "paper", near=Arc(length_mm=[60, 60], bend_rad=(0, 0))

@@ -63,7 +63,7 @@ def equation_3(theta: float, alpha: float, r: float) -> FloatArray:
 
 
 @given(lengths, thetas, alphas)
-def tesnequations_1_to_3_transform_from_base_to_top(
+def test_equations_1_to_3_transform_from_base_to_top(
     length: float, theta: float, alpha: float
 ) -> None:
     arc, r = arc_of(length, theta, alpha)
@@ -74,7 +74,7 @@ def tesnequations_1_to_3_transform_from_base_to_top(
 
 
 @given(lengths, thetas, alphas)
-def tesnequation_4_position_of_the_top(length: float, theta: float, alpha: float) -> None:
+def test_equation_4_position_of_the_top(length: float, theta: float, alpha: float) -> None:
     arc, r = arc_of(length, theta, alpha)
     close(
         kinematics.position(arc),
@@ -87,7 +87,7 @@ def tesnequation_4_position_of_the_top(length: float, theta: float, alpha: float
 
 
 @given(lengths, thetas, alphas)
-def tesnequations_5_to_7_inverse(length: float, theta: float, alpha: float) -> None:
+def test_equations_5_to_7_inverse(length: float, theta: float, alpha: float) -> None:
     _, r = arc_of(length, theta, alpha)
     x, y, z, _ = equation_3(theta, alpha, r)[:, 3]
     arc = kinematics.inverse((x, y, z))
@@ -101,7 +101,7 @@ def tesnequations_5_to_7_inverse(length: float, theta: float, alpha: float) -> N
 
 
 @given(lengths, thetas, alphas, tip_offsets)
-def tesnequations_8_to_10_tip(length: float, theta: float, alpha: float, offset: float) -> None:
+def test_equations_8_to_10_tip(length: float, theta: float, alpha: float, offset: float) -> None:
     arc, r = arc_of(length, theta, alpha)
     d_t_u = equation_3(theta, alpha, r)
     close(kinematics.transform(arc, tip_offset_mm=offset), d_t_u @ shift(z=offset))  # 8, 9
@@ -135,7 +135,7 @@ def attachments(theta: float, alpha: float, r: float) -> tuple[FloatArray, Float
 
 
 @given(lengths, thetas, alphas)
-def tesnequation_11_attachments_move_with_the_top(
+def test_equation_11_attachments_move_with_the_top(
     length: float, theta: float, alpha: float
 ) -> None:
     arc, r = arc_of(length, theta, alpha)
@@ -145,7 +145,7 @@ def tesnequation_11_attachments_move_with_the_top(
 
 
 @given(lengths, thetas, alphas)
-def tesnequation_12_tendon_lengths(length: float, theta: float, alpha: float) -> None:
+def test_equation_12_tendon_lengths(length: float, theta: float, alpha: float) -> None:
     arc, r = arc_of(length, theta, alpha)
     low, high = attachments(theta, alpha, r)
     centre = np.array([r * math.cos(alpha), r * math.sin(alpha), 0])

@@ -38,7 +38,7 @@ def test_lengths_stay_smooth_while_the_bending_vanishes(model: str) -> None:
 
 def test_models_agree_on_the_inner_tendon_in_the_bending_plane() -> None:
     arc = Arc(length_mm=50, bend_rad=(1.2, 0))
-    paper, parallel = (tendons.lengths(arc, GEOMETRY, model) for model in TENDON_MODELS)
+    paper, parallel = (tendons.lengths(arc, GEOMETRY, model) for model in ("paper", "parallel"))
     assert paper[0] == pytest.approx(parallel[0], abs=1e-12)
     assert paper[2] < parallel[2]  # a chord is shorter than its arc
 
