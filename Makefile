@@ -87,6 +87,7 @@ pictures: .venv/.installed ## run the exploration, and draw the documentation's 
 .PHONY: test
 test: ## check everything: style, types, drift, firmware, wheel, behaviour
 	@.ci/need --install python compiler
+	@$(PIO) --version # sets PlatformIO up: what that lacks is said first, not after minutes
 	@$(MAKE) --no-print-directory lint
 	@$(MAKE) --no-print-directory drift
 	@$(MAKE) --no-print-directory firmware-test
