@@ -221,3 +221,19 @@ def test_a_world_says_when_it_is_used_at_the_wrong_time() -> None:
     world.close()
     with pytest.raises(SimulationError, match="closed"):
         world.run(1_000)
+
+
+def test_the_truth_is_never_an_old_one() -> None:
+    """The world is asked once between two changes, so each change has to count as one."""
+    world = started()
+    before = world.truth()
+    assert not world.arm_moving
+    world.arm_move((0.0, 0.0, -20.0), 40.0, 200.0)
+    assert world.arm_moving
+    world.run(500_000)
+    assert world.arm_mm[2] < -1.0
+    assert world.truth().arm_mm.tolist() == list(world.arm_mm)
+    assert before.arm_mm.tolist() == [0.0, 0.0, 0.0]
+    world.close()
+    with pytest.raises(SimulationError):
+        world.truth()

@@ -32,13 +32,12 @@ class SimulatedStage:
     @property
     def position_mm(self) -> tuple[float, float, float]:
         """Where the origin of frame D is now, in the world."""
-        x_mm, y_mm, z_mm = self._world.truth().arm_mm.tolist()
-        return (x_mm, y_mm, z_mm)
+        return self._world.arm_mm
 
     @property
     def moving(self) -> bool:
         """Whether the arm moves."""
-        return self._world.truth().arm_moving
+        return self._world.arm_moving
 
     def move_to(
         self,

@@ -140,7 +140,10 @@ class World:
         self._handle = self._library.setae_world_create(seed)
         if not self._handle:
             raise MemoryError
-        self._truth = CTruth()
+        # The same memory twice: C writes it, numpy reads it.
+        self._truth_fields = np.zeros((), dtype=np.dtype(CTruth))
+        self._truth = CTruth.from_buffer(self._truth_fields.data)
+        self._truth_holds = False
         self._room = ctypes.create_string_buffer(_READ_ROOM)
         self._size = ctypes.c_size_t()
         for name, value in dict(parameters).items():
@@ -154,7 +157,7 @@ class World:
         InputError
             No parameter has that name, or the value is no good for it.
         """
-        self._check(self._library.setae_world_set(self._live, name.encode(), value))
+        self._change(self._library.setae_world_set(self._live, name.encode(), value))
 
     def get(self, name: str) -> float:
         """Return a parameter's value. Raises InputError where there is none of that name."""
@@ -165,7 +168,7 @@ class World:
     def add_tube(self, axis_point_mm: Sequence[float], inner_radius_mm: float) -> None:
         """Add a vertical tube, before the start; its wall is all beyond the inner radius."""
         point = _vector("axis_point_mm", axis_point_mm)
-        self._check(self._library.setae_world_add_tube(self._live, point, inner_radius_mm))
+        self._change(self._library.setae_world_add_tube(self._live, point, inner_radius_mm))
 
     def add_box(
         self, centre_mm: Sequence[float], edges_mm: Sequence[float], yaw_rad: float = 0.0
@@ -173,7 +176,7 @@ class World:
         """Add an upright box, turned by yaw about z, before the start."""
         centre = _vector("centre_mm", centre_mm)
         edges = _vector("edges_mm", edges_mm)
-        self._check(self._library.setae_world_add_box(self._live, centre, edges, yaw_rad))
+        self._change(self._library.setae_world_add_box(self._live, centre, edges, yaw_rad))
 
     def start(self, arm_mm: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Switch the power on, with the origin of frame D at `arm_mm` in the world.
@@ -185,7 +188,7 @@ class World:
         SimulationError
             The spring has no equilibrium with these parameters.
         """
-        self._check(self._library.setae_world_start(self._live, _vector("arm_mm", arm_mm)))
+        self._change(self._library.setae_world_start(self._live, _vector("arm_mm", arm_mm)))
 
     @property
     def now_us(self) -> int:
@@ -194,7 +197,7 @@ class World:
 
     def send(self, data: bytes) -> None:
         """Put bytes on the line to the board now."""
-        self._check(self._library.setae_world_send(self._live, data, len(data)))
+        self._change(self._library.setae_world_send(self._live, data, len(data)))
 
     def run(self, until_us: int) -> bytes:
         """Step until bytes for the host are there, or the time has come.
@@ -212,7 +215,7 @@ class World:
             The spring's equilibrium could not be found.
         """
         self._size.value = _READ_ROOM
-        self._check(
+        self._change(
             self._library.setae_world_run(
                 self._live, until_us, self._room, ctypes.byref(self._size)
             )
@@ -232,51 +235,71 @@ class World:
             The arm is moving.
         """
         target = _vector("target_mm", target_mm)
-        self._check(
+        self._change(
             self._library.setae_world_arm_move(self._live, target, speed_mm_s, acceleration_mm_s2)
         )
 
     def arm_stop(self, acceleration_mm_s2: float) -> None:
         """Brake the arm on its present line."""
-        self._check(self._library.setae_world_arm_stop(self._live, acceleration_mm_s2))
+        self._change(self._library.setae_world_arm_stop(self._live, acceleration_mm_s2))
+
+    @property
+    def arm_mm(self) -> tuple[float, float, float]:
+        """Origin of frame D in the world now."""
+        x_mm, y_mm, z_mm = self._look().arm_mm
+        return (x_mm, y_mm, z_mm)
+
+    @property
+    def arm_moving(self) -> bool:
+        """Whether the arm moves now."""
+        return bool(self._look().arm_moving)
 
     def truth(self) -> Truth:
         """Look at the world as it is now; changes nothing in it."""
-        raw = self._truth
-        self._check(self._library.setae_world_truth(self._live, ctypes.byref(raw)))
+        raw = self._look()
+        # One copy of all: the fields below are views of it, in which nobody writes.
+        now = self._truth_fields.copy()
         bits = raw.board_attached
         depth_mm = raw.contact_depth_mm
         return Truth(
             time_us=raw.time_us,
-            arm_mm=np.array(raw.arm_mm),
-            arm_target_mm=np.array(raw.arm_target_mm),
+            arm_mm=now["arm_mm"],
+            arm_target_mm=now["arm_target_mm"],
             arm_moving=bool(raw.arm_moving),
             attached=(bool(bits & 1), bool(bits & 2), bool(bits & 4), bool(bits & 8)),
-            pulse_us=np.array(raw.pulse_us),
-            servo_length_mm=np.array(raw.servo_length_mm),
-            tension_n=np.array(raw.tension_n),
-            backbone_mm=np.array(raw.backbone_mm),
-            rotation=np.array(raw.rotation).reshape(3, 3),
-            filament_mm=np.array(raw.filament_mm),
+            pulse_us=now["pulse_us"],
+            servo_length_mm=now["servo_length_mm"],
+            tension_n=now["tension_n"],
+            backbone_mm=now["backbone_mm"],
+            rotation=now["rotation"].reshape(3, 3),
+            filament_mm=now["filament_mm"],
             contact_depth_mm=depth_mm,
-            contact_point_mm=np.array(raw.contact_point_mm) if depth_mm > 0 else None,
+            contact_point_mm=now["contact_point_mm"] if depth_mm > 0 else None,
             pressure_hpa=raw.pressure_hpa,
             plant_residual=raw.plant_residual,
         )
 
+    def _look(self) -> CTruth:
+        """The truth, asked for once between two changes of the world."""
+        if not self._truth_holds:
+            self._check(self._library.setae_world_truth(self._live, ctypes.byref(self._truth)))
+            self._truth_holds = True
+        return self._truth
+
     def sensor_fault(self, fault: SensorFault) -> None:
         """Break the pressure sensor, or mend it."""
-        self._check(self._library.setae_world_sensor_fault(self._live, int(fault)))
+        self._change(self._library.setae_world_sensor_fault(self._live, int(fault)))
 
     def reset_board(self) -> None:
         """Press the reset button: the board starts anew, its retained memory survives."""
-        self._check(self._library.setae_world_reset_board(self._live))
+        self._change(self._library.setae_world_reset_board(self._live))
 
     def close(self) -> None:
         """Let go of the world. Closing twice is fine."""
         if self._handle:
             self._library.setae_world_destroy(self._handle)
             self._handle = None
+            self._truth_holds = False
 
     def __enter__(self) -> Self:
         return self
@@ -298,6 +321,11 @@ class World:
         if self._handle is None:
             raise SimulationError("The simulated world was closed.", "Make a new one.")
         return self._handle
+
+    def _change(self, status: int) -> None:
+        """After each call that may have changed the world."""
+        self._truth_holds = False
+        self._check(status)
 
     def _check(self, status: int) -> None:
         if status == 0:
