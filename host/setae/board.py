@@ -49,6 +49,9 @@ class Board:
         self.trip: Tripped | None = None
         self.fault: FaultReported | None = None
         self.pressure_hpa: float | None = None
+        # Of any session: why the board is tripped or in fault, where it is.
+        self._last_trip: Tripped | None = None
+        self._last_fault: FaultReported | None = None
         self._session = session
         self._report: TelemetryReceived | None = None
         self._tickets: list[Ticket] = []
@@ -160,14 +163,14 @@ class Board:
         if state is State.TRIPPED:
             raise (
                 TrippedError("The robot is tripped: the bristle touched something.")
-                if (self.trip is None)
-                else _trip_error(self.trip)
+                if (self._last_trip is None)
+                else _trip_error(self._last_trip)
             )
         if state is State.FAULT:
             raise (
                 FaultError("unknown", "Call resume() once its cause is gone.")
-                if (self.fault is None)
-                else _fault(self.fault)
+                if (self._last_fault is None)
+                else _fault(self._last_fault)
             )
         raise RefusedError("busy", "Wait for the motion to end.", command="the motion",
                            detail="The board is moving.")  # fmt: skip
@@ -179,10 +182,14 @@ class Board:
             if telemetry.sample_count:
                 sample = telemetry.samples[telemetry.sample_count - 1]
                 self.pressure_hpa = sample.pressure_raw / PRESSURE_LSB_PER_HPA
-        elif isinstance(event, Tripped) and not event.earlier:
-            self.trip = event
-        elif isinstance(event, FaultReported) and not event.earlier:
-            self.fault = event
+        elif isinstance(event, Tripped):
+            self._last_trip = event
+            if not event.earlier:
+                self.trip = event
+        elif isinstance(event, FaultReported):
+            self._last_fault = event
+            if not event.earlier:
+                self.fault = event
 
     def reflex_ended(self) -> bool:
         """Whether the board is tripped and its reflex is over."""

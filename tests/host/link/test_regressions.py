@@ -11,7 +11,8 @@ from tests.host.link.model import (
     segments,
 )
 
-from setae.errors import DeadlineError
+from setae.board import Board
+from setae.errors import DeadlineError, FaultError
 from setae.link.events import FaultReported, Refused, TicketState, Tripped
 from setae.link.handshake import Phase
 from setae.link.session import Session
@@ -93,6 +94,22 @@ def test_an_earlier_hosts_trip_and_fault_are_told_as_earlier_though_the_recall_w
     told = [event for event in events if isinstance(event, (Tripped, FaultReported))]
     assert len(told) == 2
     assert all(event.earlier for event in told)
+
+
+def test_a_fault_from_before_the_session_is_named() -> None:
+    """A board that the watchdog had reset answered motion with the fault `unknown`.
+
+    Its record was told as an earlier one, and no longer known when somebody asked.
+    """
+    line = ModelTransport()
+    line.board.fault(Fault.WATCHDOG)
+    session = Session(line, session_id=7)
+    board = Board(session)
+    session.open()
+    session.run_for(SECOND_US)
+    assert session.state is State.FAULT
+    with pytest.raises(FaultError, match="watchdog"):
+        board.require_holding()
 
 
 def test_an_earlier_hosts_stop_does_not_confirm_ours() -> None:
