@@ -23,6 +23,7 @@ from setae_protocol.messages import (
     State,
     Telemetry,
 )
+from tests.system.link_stress import Stress
 
 SECOND_US = 1_000_000
 START_TICKS = 1_800
@@ -165,6 +166,15 @@ def test_each_refusal_reaches_its_command(down: Faults, up: Faults, seed: int) -
         assert [event.ticket for event in made.refused] == refused
         assert tickets[-1] in refused, "the second enable"
         assert tickets[1] not in refused, "the first enable"
+
+
+@pytest.mark.parametrize(("seed", "rate"), [(1, 0.01), (2, 0.1)])
+def test_random_commands_lose_and_double_nothing(seed: int, rate: float) -> None:
+    """`python -m tests.system.link_stress` is the same with 100 000 commands."""
+    count = Stress(seed, rate).run(1_500)
+    assert count.wrong == 0, count
+    assert count.stops > 0
+    assert count.frames_harmed > 0
 
 
 def test_button_pressed_in_mid_motion() -> None:
