@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.system.link_stress import Stress
 
 from setae.errors import BoardResetError
 from setae.link.events import Event, Refused, TelemetryReceived, Ticket, TicketState
@@ -23,7 +24,6 @@ from setae_protocol.messages import (
     State,
     Telemetry,
 )
-from tests.system.link_stress import Stress
 
 SECOND_US = 1_000_000
 START_TICKS = 1_800
