@@ -120,6 +120,8 @@ class _Key:
 _UNITS = {
     "n_per_mm": "N/mm",
     "us_per_degree": "µs/°",
+    "mm_per_turn": "mm/turn",
+    "mm_s3": "mm/s³",
     "mm_s2": "mm/s²",
     "mm_s": "mm/s",
     "mm": "mm",
@@ -129,6 +131,8 @@ _UNITS = {
     "ms": "ms",
     "s": "s",
     "hpa": "hPa",
+    "n_m": "N·m",
+    "um": "µm",
     "n": "N",
 }
 
@@ -325,17 +329,24 @@ class Servo(_Section):
     pulse_min_us, pulse_max_us
         Pulses that the servo can follow without running into its end stop.
     pulse_free_us
-        Pulse at which the tendon has the spring's free length.
+        Pulse at which the tendon has the spring's free length: the servo's trim.
     direction
         +1 where a longer pulse winds the tendon up, -1 where it unwinds.
     us_per_degree
         Change of the pulse for a degree of the horn.
+    growth_mm_per_turn
+        How much the winding radius grows with each turn, as layers pile up; 0 where
+        the turns lie side by side. At the free length it is `pulley_radius_mm`.
     speed_mm_s
         Fastest tendon that the servo manages.
     lag_ms
         Time from a pulse to the horn's motion.
-    min_tension_n, max_tension_n
-        Tension that a tendon needs to be taut, and that the servo holds for long.
+    stall_torque_n_m
+        Torque at which the servo stalls, at the voltage that it gets.
+    torque_part
+        Part of the stall torque that it holds for long without getting hot.
+    min_tension_n
+        Preload: tension that each tendon needs to count as taut.
     """
 
     pulse_min_us: tuple[float, ...] = _key(low=500, high=2500, count=(SERVOS, SERVOS))
@@ -343,10 +354,12 @@ class Servo(_Section):
     pulse_free_us: tuple[float, ...] = _key(low=500, high=2500, count=(SERVOS, SERVOS))
     direction: tuple[int, ...] = _key(low=-1, high=1, choices=(1, -1), count=(SERVOS, SERVOS))
     us_per_degree: tuple[float, ...] = _key(low=1, high=100, count=(SERVOS, SERVOS))
+    growth_mm_per_turn: tuple[float, ...] = _key(low=0, high=50, count=(SERVOS, SERVOS))
     speed_mm_s: float = _key(low=1, high=5000)
     lag_ms: float = _key(low=0, high=1000)
+    stall_torque_n_m: float = _key(low=1e-4, high=1000)
+    torque_part: float = _key(low=0.01, high=1)
     min_tension_n: float = _key(low=0, high=1000)
-    max_tension_n: float = _key(low=0.01, high=1000)
 
     def _contradiction(self) -> str:
         for index, (low, free, high) in enumerate(
@@ -361,11 +374,6 @@ class Servo(_Section):
                     f"servo {index}: pulse_free_us = {free:g} must lie from "
                     f"pulse_min_us = {low:g} to pulse_max_us = {high:g}."
                 )
-        if self.min_tension_n >= self.max_tension_n:
-            return (
-                f"min_tension_n = {self.min_tension_n:g} must be below "
-                f"max_tension_n = {self.max_tension_n:g}."
-            )
         return ""
 
 
@@ -383,6 +391,11 @@ class Motion(_Section):
         Fastest tendon in an ordinary move, in the reflex, while unwinding.
     probe_speed_mm_s
         Tip in a guarded move.
+    acceleration_mm_s2, jerk_mm_s3
+        Highest of any tendon, in every planned motion.
+    tolerance_um
+        How far the straight lines that the board plays may leave the planned motion
+        of a tendon, besides the rounding to ticks.
     hold_timeout_s
         Holding this long without a host relaxes the robot; 0 never does.
     """
@@ -393,6 +406,9 @@ class Motion(_Section):
     probe_speed_mm_s: float = _key(low=0.1, high=5000)
     retract_speed_mm_s: float = _key(low=0.1, high=5000)
     relax_speed_mm_s: float = _key(low=0.1, high=5000)
+    acceleration_mm_s2: float = _key(low=1, high=1e6)
+    jerk_mm_s3: float = _key(low=1, high=1e9)
+    tolerance_um: float = _key(low=0, high=1e4)
     hold_timeout_s: int = _key(low=0, high=65535, integer=True)
 
     def _contradiction(self) -> str:
@@ -536,6 +552,14 @@ class Config:
                 f"[geometry] tendon_angles_deg has {count} entries.",
                 f"The board drives {SERVOS} servos: give {SERVOS}. "
                 "`Geometry` alone takes any number.",
+            )
+        most_n = self.servo.stall_torque_n_m * self.servo.torque_part * 1e3
+        most_n /= self.geometry.pulley_radius_mm
+        if self.servo.min_tension_n >= most_n:
+            raise ConfigError(
+                f"[servo] min_tension_n = {self.servo.min_tension_n:g} must be below the "
+                f"{most_n:.3g} N that a servo holds.",
+                "That is stall_torque_n_m times torque_part over pulley_radius_mm.",
             )
         length, low, high = (
             self.explore.compressed_length_mm,

@@ -1,10 +1,12 @@
 """Between tendon lengths, servo pulses and what the board understands.
 
-    pulse_us = pulse_free_us + direction · us_per_mm · (free_length − length)
+    pulse_us = pulse_free_us + direction · us_per_degree · φ        in degrees
+    free_length − length = R φ + g φ² / 4π                          in radians
 
-One microsecond of pulse is 0.055 mm of tendon with the paper's pulleys. The
-board counts pulses in ticks of 0.5 µs: rounding to the nearest one leaves at most
-0.014 mm, half a tick.
+`setae.pulley` has the second line: g is the growth of the pulley where the line
+winds onto itself, 0 unless configured. One microsecond of pulse is 0.055 mm of
+tendon with the paper's pulleys. The board counts pulses in ticks of 0.5 µs, 0.027 mm:
+rounding to the nearest one leaves at most 0.014 mm, half a tick.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from setae import tendons, workspace
+from setae import packing, pulley, tendons, workspace
 from setae.arc import Arc, FloatArray, finite_array, first_place
 from setae.config import SERVOS, TENDON_MODELS, Config
 from setae.errors import ConfigError, InputError, UnreachableError
@@ -45,6 +47,9 @@ class ServoModel:
     ----------
     length_min_mm, length_max_mm : ndarray, shape (4,)
         Shortest and longest tendon that each servo can give.
+    resolution_mm : ndarray, shape (4,)
+        Tendon that one tick of 0.5 µs winds, where it winds most: 0.027 mm on the
+        paper's pulleys. Rounding costs at most half of it.
     slew_ticks : int
         Fastest change of any pulse that the board allows, ticks a servo frame.
     max_speed_mm_s : ndarray, shape (4,)
@@ -64,14 +69,16 @@ class ServoModel:
     """
 
     def __init__(self, config: Config) -> None:
+        self._config = config
         self._free_mm = config.geometry.free_length_mm
-        self._free_us = np.array(config.servo.pulse_free_us)
-        self._us_per_mm = workspace.us_per_mm(config) * np.array(config.servo.direction)
         self._min_us = np.array(config.servo.pulse_min_us)
         self._max_us = np.array(config.servo.pulse_max_us)
         self.length_min_mm, self.length_max_mm = workspace.servo_range_mm(config)
 
-        ticks_per_mm = np.abs(self._us_per_mm) * TICKS_PER_US
+        ends = np.stack(pulley.travel_mm(config))
+        shrink = config.geometry.pulley_radius_mm / pulley.radius_mm(ends, config)
+        ticks_per_mm = pulley.us_per_mm(config) * TICKS_PER_US * shrink
+        self.resolution_mm = 1 / ticks_per_mm.min(axis=0)
         # One limit for four servos: the one with the fewest ticks a millimetre sets it.
         self.slew_ticks = math.floor(
             config.motion.slew_mm_s * FRAME_S * float(ticks_per_mm.min()) + 1e-9
@@ -83,7 +90,7 @@ class ServoModel:
                 f"Choose at least {3 / (FRAME_S * float(ticks_per_mm.min())):.1f} mm/s.",
             )
         # Rounding both ends of a frame can add one tick.
-        board_mm_s = (self.slew_ticks - 1) / ticks_per_mm / FRAME_S
+        board_mm_s = (self.slew_ticks - 1) / ticks_per_mm.max(axis=0) / FRAME_S
         self.max_speed_mm_s = np.minimum(board_mm_s, config.servo.speed_mm_s)
 
     def pulses_us(self, lengths_mm: npt.ArrayLike) -> FloatArray:
@@ -123,7 +130,7 @@ class ServoModel:
         return np.asarray(np.clip(pulses, self._min_us, self._max_us))
 
     def _unchecked_us(self, q: FloatArray) -> FloatArray:
-        return np.asarray(self._free_us + self._us_per_mm * (self._free_mm - q))
+        return pulley.pulses_us(self._free_mm - q, self._config)
 
     def ticks(self, lengths_mm: npt.ArrayLike) -> IntArray:
         """Like `pulses_us`, in the board's ticks, rounded to the nearest."""
@@ -143,7 +150,7 @@ class ServoModel:
             Tendon lengths in mm.
         """
         pulses = finite_array("ticks", ticks, last_axis=SERVOS, what="one a servo")
-        return np.asarray(self._free_mm - (pulses / TICKS_PER_US - self._free_us) / self._us_per_mm)
+        return self._free_mm - pulley.wound_by_us(pulses / TICKS_PER_US, self._config)
 
     def lengths_from_us(self, pulses_us: npt.ArrayLike) -> FloatArray:
         """Like `lengths_mm`, from pulses in µs."""
@@ -163,53 +170,97 @@ class ServoModel:
         >>> ServoModel(config.load()).speed_ticks(20.0)
         14
         """
-        ticks_per_mm = float(np.abs(self._us_per_mm).min()) * TICKS_PER_US
+        ticks_per_mm = 1 / float(self.resolution_mm.max())
         return max(1, min(self.slew_ticks, math.floor(speed_mm_s * FRAME_S * ticks_per_mm)))
 
     def segments(
-        self, lengths_mm: npt.ArrayLike, *, frames_each: int = 1
+        self,
+        lengths_mm: npt.ArrayLike,
+        *,
+        start_ticks: npt.ArrayLike | None = None,
+        tolerance_um: float | None = None,
+        max_frames: int = packing.LONGEST_FRAMES,
     ) -> tuple[messages.Segment, ...]:
-        """Make the board's segments for tendon lengths in successive servo frames.
+        """Make the fewest segments that bring the tendons along given lengths.
+
+        The board goes straight, in pulses, from the end of one segment to the end of
+        the next, and rounds to ticks. What it plays in each servo frame is within
+        the tolerance and half a tick of the lengths; more segments would be no closer
+        than half a tick.
 
         Parameters
         ----------
         lengths_mm : array_like, shape (n_frames, 4)
-            Where the tendons are at the end of each frame.
-        frames_each
-            Servo frames that a segment takes; the board goes straight in between.
-            The last one may take fewer.
+            Where the tendons are at the end of each servo frame.
+        start_ticks : array_like, shape (4,)
+            Where the board starts. None: at the first lengths.
+        tolerance_um
+            As above; None takes the configuration's.
+        max_frames
+            Longest segment.
 
         Returns
         -------
         tuple of Segment
-            They end exactly where the lengths do, to rounding.
+            The last ends where the lengths do, to rounding.
+
+        Raises
+        ------
+        UnreachableError
+            As `pulses_us`.
+        InputError
+            No frames, or a tolerance or longest segment that means nothing.
+        TrajectoryError
+            The lengths change faster than the board allows.
 
         Examples
         --------
         >>> from setae import config
-        >>> ServoModel(config.load()).segments([[70, 70, 70, 69]])[0].target_ticks
-        (1700, 1700, 1700, 1736)
+        >>> servos = ServoModel(config.load())
+        >>> line = np.linspace([70, 70, 70, 69], [70, 70, 70, 60], 10)
+        >>> [(s.duration_frames, s.target_ticks[3]) for s in servos.segments(line)]
+        [(1, 1736), (9, 2064)]
         """
-        ticks = self.ticks(lengths_mm)
-        if ticks.ndim != 2 or not len(ticks):
+        pulses = self.pulses_us(lengths_mm) * TICKS_PER_US
+        if pulses.ndim != 2 or not len(pulses):
             raise InputError(
-                f"lengths_mm has shape {ticks.shape}.", "It must be (n_frames, 4), n_frames ≥ 1."
+                f"lengths_mm has shape {pulses.shape}.", "It must be (n_frames, 4), n_frames ≥ 1."
             )
-        if not 1 <= frames_each <= 1000:
-            raise InputError(f"frames_each is {frames_each}.", "It must be from 1 to 1000.")
-        ends = [*range(frames_each, len(ticks), frames_each), len(ticks)]
-        starts = [0, *ends[:-1]]
-        result = []
-        for start, end in zip(starts, ends, strict=True):
-            a, b, c, d = (int(tick) for tick in ticks[end - 1])
-            result.append(messages.Segment(duration_frames=end - start, target_ticks=(a, b, c, d)))
-        return tuple(result)
+        if tolerance_um is None:
+            tolerance_um = self._config.motion.tolerance_um
+        start = np.rint(pulses[0]) if start_ticks is None else np.asarray(start_ticks)
+        ends, ticks = packing.pack(
+            pulses,
+            start_ticks=start.astype(np.int64),
+            tolerance_ticks=tolerance_um * 1e-3 / self.resolution_mm,
+            slew_ticks=self.slew_ticks,
+            max_frames=max_frames,
+        )
+        return tuple(
+            messages.Segment(duration_frames=int(frames), target_ticks=_four(target))
+            for frames, target in zip(np.diff(ends, prepend=0), ticks, strict=True)
+        )
+
+
+def _four(values: npt.ArrayLike) -> tuple[int, int, int, int]:
+    w, x, y, z = (int(value) for value in np.asarray(values))
+    return w, x, y, z
 
 
 def segment_messages(
-    segments: Sequence[messages.Segment], *, epoch: int
+    segments: Sequence[messages.Segment], *, epoch: int, max_frames: int | None = None
 ) -> tuple[messages.Segments, ...]:
     """Pack segments into as few messages as they take.
+
+    Parameters
+    ----------
+    segments
+        In their order.
+    epoch
+        The board's motion epoch.
+    max_frames
+        Servo frames that one message may take, single longer segments excepted: what
+        is sent in small portions can be stopped by sending no more.
 
     Examples
     --------
@@ -218,9 +269,19 @@ def segment_messages(
     [5, 2]
     """
     size = messages.SEGMENTS_PER_MESSAGE
+    parts: list[list[messages.Segment]] = []
+    frames = 0
+    for segment in segments:
+        frames += segment.duration_frames
+        full = parts and (
+            len(parts[-1]) == size or (max_frames is not None and frames > max_frames)
+        )
+        if full or not parts:
+            parts.append([])
+            frames = segment.duration_frames
+        parts[-1].append(segment)
     result = []
-    for first in range(0, len(segments), size):
-        part = list(segments[first : first + size])
+    for part in parts:
         a, b, c, d, e = part + [_NO_SEGMENT] * (size - len(part))
         result.append(messages.Segments(epoch=epoch, count=len(part), segments=(a, b, c, d, e)))
     return tuple(result)
@@ -272,7 +333,8 @@ def board_limits(config: Config, *, margin_mm: float = 1.0) -> messages.SetLimit
     q = _workspace_lengths_mm(config)
     low = np.clip(q.min(axis=0) - margin_mm, shortest, longest)
     ends = np.stack([servos.pulses_us(low), servos.pulses_us(longest)]) * TICKS_PER_US
-    pulse_min, pulse_max = np.ceil(ends.min(axis=0)), np.floor(ends.max(axis=0))
+    # Rounding must not shift a limit that is a whole tick.
+    pulse_min, pulse_max = np.ceil(ends.min(axis=0) - 1e-6), np.floor(ends.max(axis=0) + 1e-6)
 
     sums: list[tuple[int, int]] = []
     differences: list[tuple[int, int]] = []
@@ -281,25 +343,27 @@ def board_limits(config: Config, *, margin_mm: float = 1.0) -> messages.SetLimit
         sum_high = float(longest[a] + longest[b])
         difference_low = float((q[:, a] - q[:, b]).min()) - margin_mm
         difference_high = float((q[:, a] - q[:, b]).max()) + margin_mm
-        # The corners of the allowed rectangle, as pulses: with servos that turn different
-        # ways, the board's sum is the tendons' difference.
-        corners = np.zeros((4, SERVOS))
-        for corner, (total, difference) in enumerate(
-            (s, d) for s in (sum_low, sum_high) for d in (difference_low, difference_high)
-        ):
-            corners[corner, [a, b]] = (total + difference) / 2, (total - difference) / 2
-        ticks = servos._unchecked_us(corners) * TICKS_PER_US
+        # The edges of the allowed rectangle, as pulses: with servos that turn different
+        # ways, the board's sum is the tendons' difference. With a pulley that grows, the
+        # extremes may lie between the corners, but always on the edges.
+        part = np.linspace(0.0, 1.0, 257)
+        total, difference = (
+            low + (high - low) * np.concatenate(sides)
+            for low, high, sides in (
+                (sum_low, sum_high, (part, part, 0 * part, 0 * part + 1)),
+                (difference_low, difference_high, (0 * part, 0 * part + 1, part, part)),
+            )
+        )
+        edges = np.zeros((len(total), SERVOS))
+        edges[:, a], edges[:, b] = (total + difference) / 2, (total - difference) / 2
+        ticks = servos._unchecked_us(edges) * TICKS_PER_US
         pulse_sum, pulse_difference = ticks[:, a] + ticks[:, b], ticks[:, a] - ticks[:, b]
-        sums.append((math.floor(pulse_sum.min()), math.ceil(pulse_sum.max())))
-        differences.append((math.floor(pulse_difference.min()), math.ceil(pulse_difference.max())))
-
-    def four(values: FloatArray) -> tuple[int, int, int, int]:
-        w, x, y, z = (int(value) for value in values)
-        return w, x, y, z
+        sums.append(_outwards(pulse_sum))
+        differences.append(_outwards(pulse_difference))
 
     return messages.SetLimits(
-        pulse_min_ticks=four(pulse_min),
-        pulse_max_ticks=four(pulse_max),
+        pulse_min_ticks=_four(pulse_min),
+        pulse_max_ticks=_four(pulse_max),
         slew_ticks=servos.slew_ticks,
         pair_sum_min_ticks=(sums[0][0], sums[1][0]),
         pair_sum_max_ticks=(sums[0][1], sums[1][1]),
@@ -310,6 +374,10 @@ def board_limits(config: Config, *, margin_mm: float = 1.0) -> messages.SetLimit
         ),
         hold_timeout_s=config.motion.hold_timeout_s,
     )
+
+
+def _outwards(ticks: FloatArray) -> tuple[int, int]:
+    return math.floor(ticks.min() + 1e-6), math.ceil(ticks.max() - 1e-6)
 
 
 def _workspace_lengths_mm(config: Config) -> FloatArray:

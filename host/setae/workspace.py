@@ -3,32 +3,32 @@
 Reaching is geometry: the spring's length, the bending angle, the servos' travel.
 Holding is statics: tendons only pull, and bending costs compression, so some
 poses that geometry allows need a tendon to push. Those are told apart: the
-paper commands such poses, and the robot takes a shape near them.
+paper commands such poses, and the robot takes a shape near them (`setae.statics`).
 """
 
 from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from setae import tendons
+from setae import pulley, statics, tendons
 from setae.arc import Arc, FloatArray
-from setae.config import Config, Geometry
+from setae.config import Config
 from setae.errors import UnreachableError
 
 __all__ = [
     "Reach",
     "Reason",
     "check",
+    "nearest_holdable",
     "reachable_lengths_mm",
     "require",
     "servo_range_mm",
-    "tensions_n",
 ]
 
 TOLERANCE = 1e-6
@@ -86,6 +86,11 @@ class Reach:
         return np.asarray((self.reasons & ~int(STATIC)) == 0)
 
     @property
+    def settled(self) -> statics.Settled:
+        """Where the spring comes to rest with these tendon lengths, and what hangs slack."""
+        return statics.settle(self.lengths_mm, self.config)
+
+    @property
     def holdable(self) -> npt.NDArray[np.bool_]:
         """Whether tendons that only pull can hold the pose, shape (...)."""
         return np.asarray((self.reasons & int(STATIC)) == 0)
@@ -93,12 +98,14 @@ class Reach:
     def explain(self, index: int | tuple[int, ...] = ()) -> tuple[str, ...]:
         """Say what is wrong with one pose, a sentence a reason, with figures."""
         index = index if isinstance(index, tuple) else (index,)
-        geometry, servo = self.config.geometry, self.config.servo
+        geometry = self.config.geometry
         reasons = Reason(int(self.reasons[index]))
         length = float(self.arc.length_mm[index])
         bend = math.degrees(float(self.arc.theta_rad[index]))
         q, low, high = self.lengths_mm[index], *_tendon_range_mm(self.config)
         short, long = int(np.argmax(low - q)), int(np.argmax(q - high))
+        tensions, most_n = np.nan_to_num(self.tensions_n[index]), statics.max_tension_n(self.config)
+        tense = int(np.argmax(tensions - most_n))
         sentences = {
             Reason.TOO_SHORT: (
                 f"The spring would be {length:.2f} mm long, and its shortest length is "
@@ -125,8 +132,8 @@ class Reach:
                 "tendon that pushes could hold this pose."
             ),
             Reason.TOO_TENSE: (
-                f"A tendon would need {np.max(self.tensions_n[index]):.1f} N, and its servo "
-                f"holds {servo.max_tension_n:g} N."
+                f"Tendon {tense} would need {tensions[tense]:.1f} N, and its servo holds "
+                f"{most_n[tense]:.1f} N for long."
             ),
         }
         return tuple(text for reason, text in sentences.items() if reason in reasons)
@@ -142,22 +149,8 @@ def servo_range_mm(config: Config) -> tuple[FloatArray, FloatArray]:
     >>> longest.round(1)
     array([71.1, 71.1, 71.1, 71.1])
     """
-    servo = config.servo
-    per_mm = us_per_mm(config) * np.array(servo.direction)
-    free_us = np.array(servo.pulse_free_us)
-    ends = np.stack(
-        [
-            config.geometry.free_length_mm - (np.array(end) - free_us) / per_mm
-            for end in (servo.pulse_min_us, servo.pulse_max_us)
-        ]
-    )
-    return ends.min(axis=0), ends.max(axis=0)
-
-
-def us_per_mm(config: Config) -> FloatArray:
-    """Find the change of each servo's pulse for a millimetre of tendon, shape (4,)."""
-    mm_per_degree = config.geometry.pulley_radius_mm * math.pi / 180
-    return np.array(config.servo.us_per_degree) / mm_per_degree
+    least, most = pulley.travel_mm(config)
+    return config.geometry.free_length_mm - most, config.geometry.free_length_mm - least
 
 
 def _tendon_range_mm(config: Config) -> tuple[FloatArray, FloatArray]:
@@ -194,10 +187,10 @@ def check(arc: Arc, config: Config, model: str | None = None) -> Reach:
     'The spring would be 75.00 mm long, and it is 70 mm long when free.'
     """
     q, reasons = _reach(arc, config, model or config.motion.model)
-    tensions = tensions_n(arc, config)
+    tensions = statics.tensions_n(arc, config)
     reasons |= np.where(np.isnan(tensions).any(axis=-1), int(Reason.NEEDS_PUSH), 0)
     with np.errstate(invalid="ignore"):
-        tense = (tensions > config.servo.max_tension_n).any(axis=-1)
+        tense = (tensions > statics.max_tension_n(config) + TOLERANCE).any(axis=-1)
     reasons |= np.where(tense, int(Reason.TOO_TENSE), 0)
     return Reach(arc, q, tensions, reasons, config)
 
@@ -272,85 +265,159 @@ def require(
     return reach.lengths_mm
 
 
-# ------------------------------------------------------------------------ statics
+# ------------------------------------------------------------------------- nearest
 
 
-def tensions_n(arc: Arc, config: Config) -> FloatArray:
-    """Compute the least tensions that hold poses, shape (..., n); NaN where none do.
+def nearest_holdable(arc: Arc, config: Config, model: str | None = None) -> Arc:
+    """Find the poses nearest to given ones that the robot can reach and hold.
 
-    The spring as a linear beam, its stiffnesses constant per free length L₀, without
-    weight or contact. The tendons' sum compresses it and their moment bends it::
-
-        Σ T = k (L₀ − L)        Σ T d u = B Δ / L₀        T ≥ the least tension
-
-    with B = k L₀ D²(1+ν) / (2(2+ν)), times the configuration's `bending_factor`. Of
-    all solutions this is the one with the least sum of squares.
+    Nearest by the distance of the spring's top U, from the given pose's side: where
+    the workspace isn't convex there may be another pose as near.
 
     Parameters
     ----------
-    arc
-        Of shape (...).
-    config
-        The robot.
+    arc, config, model
+        As in `check`.
+
+    Returns
+    -------
+    Arc
+        Of the same shape. Poses that can be held come back as they are.
+
+    Raises
+    ------
+    UnreachableError
+        Not even a straight pose can be held: preload and torque leave nothing.
 
     Examples
     --------
-    >>> from setae import config
-    >>> tensions_n(Arc(length_mm=50, bend_rad=(0, 0)), config.load()).round(6)
-    array([1.1, 1.1, 1.1, 1.1])
+    >>> from setae import config, kinematics
+    >>> pose = nearest_holdable(kinematics.inverse((12, 12, 60)), config.load())
+    >>> pose.top_mm.round(2)
+    array([10.59, 10.59, 58.26])
     """
-    geometry, spring = config.geometry, config.spring
-    rate_n = spring.axial_rate_n_per_mm * geometry.free_length_mm
-    nu = spring.poisson_ratio
-    bending_n_mm2 = (
-        spring.bending_factor * rate_n * spring.mean_diameter_mm**2 * (1 + nu) / (2 * (2 + nu))
-    )
-    moment_n_mm = bending_n_mm2 * arc.bend_rad / geometry.free_length_mm
-    sum_n = spring.axial_rate_n_per_mm * (geometry.free_length_mm - arc.length_mm)
 
-    angles = np.array(geometry.tendon_angles_rad)
-    # Rows: sum, and the moment over d, so that all are in N.
-    matrix = np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)])
-    load = np.concatenate([sum_n[..., np.newaxis], moment_n_mm / geometry.tendon_radius_mm], -1)
-    # What is left once every tendon has its least tension.
-    load = load - matrix.sum(axis=1) * config.servo.min_tension_n
-    tolerance = 1e-9 * rate_n
+    def good(poses: Arc) -> npt.NDArray[np.bool_]:
+        reach = check(poses, config, model)
+        return np.asarray(reach.reachable & reach.holdable)
 
-    best = np.full((*arc.shape, len(angles)), np.nan)
-    best_square = np.full(arc.shape, np.inf)
-    for inverse, fit in _supports(geometry):
-        candidate = load @ inverse.T
-        miss = np.abs(load @ fit.T - load).max(axis=-1)
-        square = np.sum(candidate**2, axis=-1)
-        better = (
-            (miss <= tolerance) & (candidate >= -tolerance).all(axis=-1) & (square < best_square)
+    shape = arc.shape
+    flat = arc[np.newaxis] if shape == () else arc
+    wanted = Arc(length_mm=flat.length_mm.ravel(), bend_rad=flat.bend_rad.reshape(-1, 2))
+    point = _point(wanted)
+    bad = ~good(wanted)
+    if bad.any():
+        start = _straight(good, config)
+        found = _project(wanted[bad], config, model or config.motion.model)
+        # What rounding, or a jump of the tendon rule, leaves outside, goes back inside.
+        inside, outside = np.zeros(len(found)), np.ones(len(found))
+        outside[good(_arc(found))] = 0.0
+        inside[outside == 0] = 1.0
+        for _ in range(50):
+            part = (inside + outside) / 2
+            ok = good(_arc(start + part[:, np.newaxis] * (found - start)))
+            inside = np.where(ok & (outside > 0), part, inside)
+            outside = np.where(ok, outside, np.where(outside > 0, part, 0.0))
+        point[bad] = start + inside[:, np.newaxis] * (found - start)
+    return Arc(length_mm=point[:, 0].reshape(shape), bend_rad=point[:, 1:].reshape(*shape, 2))
+
+
+def _point(arc: Arc) -> FloatArray:
+    return np.concatenate([arc.length_mm[..., np.newaxis], arc.bend_rad], axis=-1)
+
+
+def _arc(point: FloatArray) -> Arc:
+    return Arc(length_mm=point[..., 0], bend_rad=point[..., 1:])
+
+
+def _straight(good: Callable[[Arc], npt.NDArray[np.bool_]], config: Config) -> FloatArray:
+    """A straight pose that can be held, in the middle of those, as (L, Δ)."""
+    length = np.linspace(config.geometry.min_length_mm, config.geometry.free_length_mm, 401)
+    straight = np.stack([length, 0 * length, 0 * length], axis=-1)
+    held = np.flatnonzero(good(_arc(straight)))
+    if not len(held):
+        raise UnreachableError(
+            "No straight pose can be held.", "Check min_tension_n and stall_torque_n_m in [servo]."
         )
-        best_square = np.where(better, square, best_square)
-        best = np.where(better[..., np.newaxis], np.maximum(candidate, 0.0), best)
-    return best + config.servo.min_tension_n
+    return np.asarray(straight[held[len(held) // 2]])
 
 
-@lru_cache(maxsize=16)
-def _supports(geometry: Geometry) -> tuple[tuple[FloatArray, FloatArray], ...]:
-    """The sets of tendons that may carry load alone, for the solution of least squares.
+def _project(arc: Arc, config: Config, model: str) -> FloatArray:
+    """Nearest points (p, 3) of (L, Δ) within all limits, to first order at the end.
 
-    It has the form T = max(0, λ₀ + λ·u), so the loaded tendons are neighbours on the
-    circle: n² sets instead of 2ⁿ. For each, the matrix (n, 3) from load to tensions,
-    and the one (3, 3) from load to the load that these tensions carry.
+    Gauss-Newton: in each round the position and the tendon lengths count as linear
+    about the last point, and the nearest one within the then linear limits is found.
     """
-    angles = np.array(geometry.tendon_angles_rad) % (2 * math.pi)
-    order = np.argsort(angles, kind="stable")
-    n = len(order)
-    sets = {
-        tuple(sorted(int(order[(first + i) % n]) for i in range(count)))
-        for count in range(1, n + 1)
-        for first in range(n)
-    }
-    supports = []
-    for members in sorted(sets, key=lambda s: (len(s), s)):
-        index = list(members)
-        part = np.stack([np.ones(len(index)), np.cos(angles[index]), np.sin(angles[index])])
-        inverse = np.zeros((n, 3))
-        inverse[index] = np.linalg.pinv(part, rcond=1e-9)
-        supports.append((inverse, part @ inverse[index]))
-    return tuple(supports)
+    geometry = config.geometry
+    target = arc.top_mm
+    point = _point(arc)
+    point[:, 0] = np.clip(point[:, 0], geometry.min_length_mm, geometry.free_length_mm)
+    low, high = _tendon_range_mm(config)
+    fixed, fixed_most = statics.bounds(config)
+    ends = np.array([[1.0, 0, 0], [-1.0, 0, 0]])
+    ends_most = np.array([geometry.free_length_mm, -geometry.min_length_mm])
+    rule = tendons.model(model)
+    count = len(point)
+    step = np.array([1e-5, 1e-7, 1e-7])
+    for _ in range(40):
+        top, lengths = _arc(point).top_mm, rule.lengths(_arc(point), geometry)
+        by_top, by_length = np.empty((count, 3, 3)), np.empty((count, len(low), 3))
+        for axis in range(3):
+            beside = point.copy()
+            beside[:, axis] += step[axis]
+            by_top[..., axis] = (_arc(beside).top_mm - top) / step[axis]
+            by_length[..., axis] = (rule.lengths(_arc(beside), geometry) - lengths) / step[axis]
+        theta = np.hypot(point[:, 1], point[:, 2])
+        out = point[:, 1:] / np.maximum(theta, 1e-12)[:, np.newaxis]
+        bend = np.concatenate([np.zeros((count, 1)), out], axis=-1)
+        here = np.einsum("pna,pa->pn", by_length, point)
+        rows = np.concatenate(
+            [
+                np.broadcast_to(fixed, (count, *fixed.shape)),
+                np.broadcast_to(ends, (count, 2, 3)),
+                bend[:, np.newaxis],
+                by_length,
+                -by_length,
+            ],
+            axis=1,
+        )
+        most = np.concatenate(
+            [
+                np.broadcast_to(fixed_most, (count, len(fixed_most))),
+                np.broadcast_to(ends_most, (count, 2)),
+                np.full((count, 1), geometry.max_bend_rad),
+                high - lengths + here,
+                lengths - low - here,
+            ],
+            axis=1,
+        )
+        metric = np.swapaxes(by_top, -1, -2) @ by_top
+        free = point + np.linalg.solve(by_top, (target - top)[..., np.newaxis])[..., 0]
+        moved = _nearest_within(free, metric, rows, most)
+        moved[:, 0] = np.clip(moved[:, 0], geometry.min_length_mm, geometry.free_length_mm)
+        change = np.abs(moved - point).max()
+        point = moved
+        if change < 1e-10:
+            break
+    return point
+
+
+def _nearest_within(
+    wanted: FloatArray, metric: FloatArray, rows: FloatArray, most: FloatArray
+) -> FloatArray:
+    """Project onto rows @ x <= most by Hildreth's method: (p, 3), (p, 3, 3), (p, m, 3), (p, m)."""
+    inverse = np.linalg.inv(metric)
+    across = np.einsum("pab,pmb->pma", inverse, rows)
+    size = np.maximum(np.einsum("pma,pma->pm", rows, across), 1e-300)
+    force = np.zeros(most.shape)
+    point = wanted.copy()
+    for _ in range(400):
+        before = point.copy()
+        for row in range(most.shape[1]):
+            beyond = np.einsum("pa,pa->p", rows[:, row], point) - most[:, row]
+            change = np.maximum(beyond / size[:, row], -force[:, row])
+            force[:, row] += change
+            point -= change[:, np.newaxis] * across[:, row]
+        if np.abs(point - before).max() < 1e-13:
+            break
+    return point

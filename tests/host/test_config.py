@@ -164,7 +164,10 @@ MISTAKES = [
     ),
     (
         "[servo]\nmin_tension_n = 9",
-        "my.toml: [servo] min_tension_n = 9 must be below max_tension_n = 8.",
+        (
+            "my.toml: [servo] min_tension_n = 9 must be below the 7.89 N that a servo holds. "
+            "That is stall_torque_n_m times torque_part over pulley_radius_mm."
+        ),
     ),
     (
         "[motion]\nmodel = 'papr'",

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from setae import config, tendons, workspace
+from setae import config, pulley, tendons, workspace
 from setae.arc import Arc
 from setae.config import TENDON_MODELS, Config
-from setae.errors import ConfigError, InputError, UnreachableError
+from setae.errors import ConfigError, InputError, TrajectoryError, UnreachableError
 from setae.servo import ServoModel, board_limits, segment_messages
 from setae_protocol import messages
 
@@ -40,7 +40,7 @@ MIRRORED = changed(
 def test_there_and_back_within_half_a_tick(robot: Config, lengths: list[float]) -> None:
     servos = ServoModel(robot)
     error = np.abs(servos.lengths_mm(servos.ticks(lengths)) - lengths)
-    half_tick_mm = 0.25 / workspace.us_per_mm(robot)
+    half_tick_mm = 0.25 / pulley.us_per_mm(robot)
     assert (error <= half_tick_mm + 1e-9).all()
     assert half_tick_mm.max() < 0.015
 
@@ -83,34 +83,39 @@ def test_end_stops_name_the_servo_and_the_length() -> None:
 
 def test_segments_reach_every_length_in_its_frame() -> None:
     lengths = np.linspace([70.0] * 4, [60.0, 65, 70, 68], 23)
-    segments = SERVOS.segments(lengths)
+    segments = SERVOS.segments(lengths, max_frames=1)
     assert [segment.duration_frames for segment in segments] == [1] * 23
     assert [list(segment.target_ticks) for segment in segments] == SERVOS.ticks(lengths).tolist()
 
 
-def test_longer_segments_end_at_the_same_place_and_time() -> None:
-    lengths = np.linspace([70.0] * 4, [60.0, 65, 70, 68], 23)
-    segments = SERVOS.segments(lengths, frames_each=5)
-    assert [segment.duration_frames for segment in segments] == [5, 5, 5, 5, 3]
-    ticks = SERVOS.ticks(lengths)[[4, 9, 14, 19, 22]]
-    assert [list(segment.target_ticks) for segment in segments] == ticks.tolist()
+def test_fewer_segments_end_at_the_same_place_and_time() -> None:
+    lengths = np.linspace([70.0] * 4, [60.0, 65, 70, 68], 24)
+    segments = SERVOS.segments(lengths[1:], start_ticks=SERVOS.ticks(lengths[0]))
+    assert [segment.duration_frames for segment in segments] == [23]
+    assert list(segments[-1].target_ticks) == SERVOS.ticks(lengths[-1]).tolist()
 
 
 def test_segments_refuse_nothing_and_nonsense() -> None:
     with pytest.raises(InputError, match=r"n_frames ≥ 1"):
         SERVOS.segments(np.zeros((0, 4)))
-    with pytest.raises(InputError, match="frames_each is 0"):
-        SERVOS.segments([[70.0] * 4], frames_each=0)
+    with pytest.raises(InputError, match="max_frames is 0"):
+        SERVOS.segments([[70.0] * 4], max_frames=0)
+    with pytest.raises(InputError, match=r"tolerance is -0\.\d+ ticks"):
+        SERVOS.segments([[70.0] * 4], tolerance_um=-1)
+    with pytest.raises(TrajectoryError, match="slew limit"):
+        SERVOS.segments([[70.0] * 4, [50.0] * 4])
 
 
 def test_messages_hold_all_segments_in_order_and_can_be_packed() -> None:
-    segments = SERVOS.segments(np.linspace([70.0] * 4, [60.0] * 4, 13))
+    segments = SERVOS.segments(np.linspace([70.0] * 4, [60.0] * 4, 13), max_frames=1)
     packed = segment_messages(segments, epoch=7)
     assert [message.count for message in packed] == [5, 5, 3]
     assert tuple(s for message in packed for s in message.segments[: message.count]) == segments
     for message in packed:
         assert message.epoch == 7
         assert messages.Segments.unpack(message.pack()) == message
+    small = segment_messages(segments, epoch=7, max_frames=3)
+    assert [message.count for message in small] == [3, 3, 3, 3, 1]
 
 
 # ------------------------------------------------------------------------- limits
@@ -179,7 +184,7 @@ def test_limits_fit_the_message_and_the_compiled_in_bounds(robot: Config) -> Non
 
 def test_limits_carry_slew_threshold_and_timeout() -> None:
     limits = board_limits(changed("motion", hold_timeout_s=90))
-    ticks_per_mm = 2 * float(workspace.us_per_mm(CONFIG)[0])
+    ticks_per_mm = 2 * float(pulley.us_per_mm(CONFIG)[0])
     assert limits.slew_ticks == math.floor(160 * 0.02 * ticks_per_mm)
     assert limits.coarse_threshold_raw == 60 * 4096
     assert limits.hold_timeout_s == 90
@@ -203,3 +208,89 @@ def test_a_slew_limit_below_the_resolution_is_refused() -> None:
     )
     with pytest.raises(ConfigError, match="less than two pulse ticks"):
         ServoModel(slow)
+
+
+# --------------------------------------------------------------- a pulley that grows
+
+GROWING = changed("servo", growth_mm_per_turn=(1.5, 0.0, 3.0, 0.7))
+GROWING_MIRRORED = changed(
+    "servo",
+    growth_mm_per_turn=(1.5, 0.0, 3.0, 0.7),
+    direction=(1, -1, -1, 1),
+    pulse_free_us=(850.0, 2130.0, 2140.0, 860.0),
+)
+
+
+@pytest.mark.parametrize("robot", [GROWING, GROWING_MIRRORED])
+@given(st.lists(st.floats(8, 70), min_size=4, max_size=4))
+def test_a_growing_pulley_comes_back_within_half_a_tick(
+    robot: Config, lengths: list[float]
+) -> None:
+    servos = ServoModel(robot)
+    error = np.abs(servos.lengths_mm(servos.ticks(lengths)) - lengths)
+    assert (error <= servos.resolution_mm / 2 + 1e-9).all()
+    exact = servos.lengths_from_us(servos.pulses_us(lengths))
+    np.testing.assert_allclose(exact, lengths, atol=1e-9)
+
+
+def test_a_growing_pulley_winds_more_with_every_turn() -> None:
+    # A spiral: from R to R + g in a turn, so a turn winds 2π (R + g/2).
+    wound = pulley.wound_mm(np.full(4, 2 * math.pi), GROWING)
+    np.testing.assert_allclose(wound, 2 * math.pi * (35 + np.array([1.5, 0, 3.0, 0.7]) / 2))
+    np.testing.assert_allclose(pulley.angle_rad(wound, GROWING), 2 * math.pi, rtol=1e-12)
+    np.testing.assert_allclose(pulley.radius_mm(wound, GROWING), 35 + np.array([1.5, 0, 3.0, 0.7]))
+    shorter = ServoModel(GROWING).pulses_us([30.0] * 4)
+    assert shorter[1] == SERVOS.pulses_us([30.0] * 4)[1]
+    # 40 mm of tendon: 1.14 rad, on which the radius grows by 0.54 mm, half of that on average.
+    assert shorter[1] - shorter[2] == pytest.approx(5.5, abs=0.3)
+
+
+def test_without_growth_the_pulses_are_linear() -> None:
+    lengths = np.linspace([70.0] * 4, [10.0] * 4, 61)
+    expected = 850 + (70 - lengths) * 180 / math.pi / 35 * (2000 / 180)
+    np.testing.assert_allclose(SERVOS.pulses_us(lengths), expected, atol=1e-9)
+
+
+def test_a_tick_is_0_0275_mm_and_more_where_the_pulley_has_grown() -> None:
+    np.testing.assert_allclose(SERVOS.resolution_mm, 0.02749, atol=5e-6)
+    servos = ServoModel(GROWING)
+    grown = servos.resolution_mm / SERVOS.resolution_mm
+    assert grown[1] == 1
+    assert 1.01 < grown[2] < 1.05
+    # Over the whole travel a tick never winds more.
+    ticks = np.arange(1660, 4300)[:, np.newaxis] + np.zeros(4, dtype=int)
+    steps = -np.diff(servos.lengths_mm(ticks), axis=0)
+    assert (steps <= servos.resolution_mm + 1e-12).all()
+    np.testing.assert_allclose(steps.max(axis=0), servos.resolution_mm, rtol=1e-4)
+
+
+@pytest.mark.parametrize("robot", [GROWING, GROWING_MIRRORED])
+def test_the_boards_limits_are_right_for_growing_pulleys(robot: Config) -> None:
+    servos, limits = ServoModel(robot), board_limits(robot)
+    random = np.random.default_rng(8)
+    arc = Arc.from_angles(
+        length_mm=random.uniform(20, 70, 20_000),
+        theta_rad=random.uniform(0, math.pi / 2, 20_000),
+        alpha_rad=random.uniform(-math.pi, math.pi, 20_000),
+    )
+    for model in TENDON_MODELS:
+        lengths = workspace.reachable_lengths_mm(arc, robot, model)
+        assert not breaks(limits, servos.ticks(lengths)).any()
+    crushed = servos.ticks([(12.0, 12.0, 12.0, 12.0), (16.0, 40.0, 16.0, 40.0)])
+    bent = servos.ticks(
+        tendons.lengths(
+            Arc(length_mm=45, bend_rad=[(2.9, 0), (0, -2.9)]), robot.geometry, "parallel"
+        )
+    )
+    assert breaks(limits, np.concatenate([crushed, bent])).all()
+    slack = np.array(robot.servo.pulse_min_us if robot is GROWING else [830, 2150, 2150, 830])
+    assert not breaks(limits, (slack * 2).astype(int))
+
+
+def test_the_fastest_motion_keeps_the_slew_limit_on_grown_pulleys() -> None:
+    servos = ServoModel(GROWING)
+    ends = np.array([70.0, 70, 20, 40]), np.array([20.0, 30, 70, 70])
+    lengths = np.linspace(*ends, 30)
+    step_s = np.abs(np.diff(lengths, axis=0)).max(axis=0) / servos.max_speed_mm_s
+    lengths = np.linspace(*ends, math.ceil(30 * float(step_s.max()) / 0.02) + 1)
+    assert np.abs(np.diff(servos.ticks(lengths), axis=0)).max() <= servos.slew_ticks

@@ -60,77 +60,6 @@ def test_bending_costs_13_mm_of_compression_per_radian() -> None:
         assert bool(workspace.check(arc, CONFIG).holdable) is held
 
 
-def test_tensions_balance_the_spring_with_the_least_squares() -> None:
-    random = np.random.default_rng(2)
-    arc = Arc.from_angles(
-        length_mm=random.uniform(20, 70, 400),
-        theta_rad=random.uniform(0, math.pi / 2, 400),
-        alpha_rad=random.uniform(-math.pi, math.pi, 400),
-    )
-    tensions = workspace.tensions_n(arc, CONFIG)
-    held = ~np.isnan(tensions).any(axis=-1)
-    assert 0.3 < held.mean() < 0.95
-    T, bend, length = tensions[held], arc.bend_rad[held], arc.length_mm[held]
-    assert T.min() >= 0
-    np.testing.assert_allclose(T.sum(axis=-1), 0.22 * (70 - length), atol=1e-6)
-    bending = 15.4 * 19.5**2 * 1.3 / (2 * 2.3)
-    moment = np.stack([T[:, 0] - T[:, 2], T[:, 1] - T[:, 3]], axis=-1) * 8.3
-    np.testing.assert_allclose(moment, bending * bend / 70, atol=1e-5)
-    # With four tendons every other solution differs by a multiple of (1, −1, 1, −1). None with
-    # a smaller sum of squares may be without a push.
-    other = np.array([1.0, -1, 1, -1])
-    for step in (-1e-3, 1e-3):
-        moved = T + step * other
-        allowed = (moved >= 0).all(axis=-1)
-        assert ((moved**2).sum(axis=-1) >= (T**2).sum(axis=-1) - 1e-9)[allowed].all()
-
-
-def test_where_no_tensions_are_given_there_are_none() -> None:
-    """Of the pull-only solutions along (1, −1, 1, −1), search the whole line."""
-    random = np.random.default_rng(3)
-    arc = Arc.from_angles(
-        length_mm=random.uniform(50, 70, 200),
-        theta_rad=random.uniform(0.1, math.pi / 2, 200),
-        alpha_rad=random.uniform(-math.pi, math.pi, 200),
-    )
-    tensions = workspace.tensions_n(arc, CONFIG)
-    total = 0.22 * (70 - arc.length_mm)
-    moment = 15.4 * 19.5**2 * 1.3 / (2 * 2.3) / 70 / 8.3 * arc.bend_rad
-    # T0 + T2 = a, T1 + T3 = total − a, and both differences are given.
-    possible = np.abs(moment).sum(axis=-1) <= total
-    np.testing.assert_array_equal(np.isnan(tensions).any(axis=-1), ~possible)
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 5, 8])
-def test_statics_with_other_numbers_of_tendons(count: int) -> None:
-    geometry = config.Geometry(
-        tendon_angles_rad=tuple(0.3 + 2 * math.pi * i / count for i in range(count))
-    )
-    robot = object.__new__(config.Config)  # a board drives four; statics doesn't mind
-    for field in dataclasses.fields(CONFIG):
-        object.__setattr__(robot, field.name, getattr(CONFIG, field.name))
-    object.__setattr__(robot, "geometry", geometry)
-    angles = np.array(geometry.tendon_angles_rad)
-    # Loads made from tensions of neighbours, which are therefore possible.
-    for size in range(1, count + 1):
-        T = np.zeros(count)
-        T[:size] = np.linspace(0.3, 0.6, size)
-        moment = 8.3 * np.array([T @ np.cos(angles), T @ np.sin(angles)])
-        bend = moment * 70 / (15.4 * 19.5**2 * 1.3 / (2 * 2.3))
-        arc = Arc(length_mm=70 - T.sum() / 0.22, bend_rad=bend)
-        found = workspace.tensions_n(arc, robot)
-        assert found.sum() == pytest.approx(T.sum(), abs=1e-6)
-        assert (found**2).sum() <= (T**2).sum() + 1e-9
-
-
-def test_a_least_tension_keeps_tendons_taut() -> None:
-    taut = dataclasses.replace(CONFIG, servo=dataclasses.replace(CONFIG.servo, min_tension_n=0.2))
-    arc = Arc(length_mm=55, bend_rad=(0.4, 0.1))
-    assert workspace.tensions_n(arc, taut).min() >= 0.2
-    free = workspace.check(Arc(length_mm=70, bend_rad=(0, 0)), taut)
-    assert Reason.NEEDS_PUSH in Reason(int(free.reasons))
-
-
 @pytest.mark.parametrize(
     ("length", "theta", "reason", "sentence"),
     [
@@ -152,13 +81,16 @@ def test_reasons_come_with_figures(
 def test_travel_and_tension_limit_the_workspace_too() -> None:
     weak = dataclasses.replace(
         CONFIG,
-        servo=dataclasses.replace(CONFIG.servo, pulse_max_us=(1500.0,) * 4, max_tension_n=1.0),
+        servo=dataclasses.replace(
+            CONFIG.servo, pulse_max_us=(1500.0,) * 4, stall_torque_n_m=0.1, torque_part=0.35
+        ),
     )
     reach = workspace.check(Arc(length_mm=30, bend_rad=(0.5, 0)), weak)
     assert Reason(int(reach.reasons)) == Reason.TENDON_TOO_SHORT | Reason.TOO_TENSE
     short, tense = reach.explain()
     assert "Tendon 0 would be 25.85 mm long, and its servo can wind it to 34.26 mm" in short
-    assert "and its servo holds 1 N" in tense
+    assert "Tendon 0 would need 2." in tense
+    assert "and its servo holds 1.0 N for long" in tense
 
 
 def test_targets_on_the_border_are_inside_in_single_precision_too() -> None:
@@ -191,3 +123,60 @@ def test_require_names_the_first_bad_target_and_only_what_was_asked() -> None:
     with pytest.raises(UnreachableError) as raised:
         workspace.require(both, CONFIG)
     assert "pushes" not in str(raised.value)
+
+
+# ------------------------------------------------------------------------- nearest
+
+
+def test_the_nearest_pose_that_can_be_held_is_nearer_than_any_other_found() -> None:
+    random = np.random.default_rng(11)
+    targets = paper_targets(0.3)
+    reach = workspace.check(targets, CONFIG, "parallel")
+    lost = targets[reach.reachable & ~reach.holdable]
+    assert lost.shape[0] > 3
+    nearest = workspace.nearest_holdable(lost, CONFIG, "parallel")
+    found = workspace.check(nearest, CONFIG, "parallel")
+    assert (found.reachable & found.holdable).all()
+    away = np.linalg.norm(nearest.top_mm - lost.top_mm, axis=-1)
+    assert (away > 0.01).all()
+    # Thousands of poses around: none that can be held is nearer by more than rounding.
+    for i in range(lost.shape[0]):
+        around = Arc(
+            length_mm=nearest.length_mm[i] + random.normal(0, 1.0, 20_000),
+            bend_rad=nearest.bend_rad[i] + random.normal(0, 0.03, (20_000, 2)),
+        )
+        other = workspace.check(around, CONFIG, "parallel")
+        held = other.reachable & other.holdable
+        assert held.any()
+        distance = np.linalg.norm(around.top_mm[held] - lost.top_mm[i], axis=-1)
+        assert distance.min() >= away[i] - 1e-6
+
+
+@pytest.mark.parametrize("model", ["paper", "parallel"])
+def test_anything_has_a_nearest_pose_and_what_can_be_held_is_its_own(model: str) -> None:
+    random = np.random.default_rng(4)
+    arc = Arc.from_angles(
+        length_mm=random.uniform(10, 95, (20, 5)),
+        theta_rad=random.uniform(0, 2.5, (20, 5)),
+        alpha_rad=random.uniform(-math.pi, math.pi, (20, 5)),
+    )
+    nearest = workspace.nearest_holdable(arc, CONFIG, model)
+    assert nearest.shape == (20, 5)
+    found = workspace.check(nearest, CONFIG, model)
+    assert (found.reachable & found.holdable).all()
+    before = workspace.check(arc, CONFIG, model)
+    kept = before.reachable & before.holdable
+    np.testing.assert_array_equal(nearest.top_mm[kept], arc.top_mm[kept])
+    single = workspace.nearest_holdable(arc[3, 2], CONFIG, model)
+    assert single.shape == ()
+    np.testing.assert_allclose(single.top_mm, nearest.top_mm[3, 2], atol=1e-6)
+
+
+def test_a_robot_that_can_hold_nothing_says_so() -> None:
+    weak = dataclasses.replace(
+        CONFIG,
+        servo=dataclasses.replace(CONFIG.servo, stall_torque_n_m=0.35, min_tension_n=2.9),
+        spring=dataclasses.replace(CONFIG.spring, axial_rate_n_per_mm=0.01),
+    )
+    with pytest.raises(UnreachableError, match="No straight pose can be held"):
+        workspace.nearest_holdable(Arc(length_mm=60, bend_rad=(0.5, 0)), weak)

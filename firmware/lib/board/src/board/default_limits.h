@@ -11,7 +11,7 @@ constexpr protocol::SetLimits kDefaultLimits = {
     {1660, 1660, 1660, 1660},  // pulse_min_ticks
     {4050, 4050, 4050, 4050},  // pulse_max_ticks
     116,                       // slew_ticks
-    {3319, 3319},              // pair_sum_min_ticks
+    {3320, 3320},              // pair_sum_min_ticks
     {7220, 7220},              // pair_sum_max_ticks
     {-985, -985},              // pair_difference_min_ticks
     {985, 985},                // pair_difference_max_ticks
