@@ -8,7 +8,8 @@ The board keeps the robot safe on its own; nothing here is needed for that.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -66,6 +67,8 @@ _TARE_ATTEMPTS = 4
 _TARE_S = 0.5
 _RETRIED = (Refusal.TARE_NOISY, Refusal.TARE_FAR)
 _GUARD_FRAMES_MAX = 0xFFFF
+# What the board has of a motion, in servo frames: a second, which it goes on without the host.
+_AHEAD_FRAMES = 50
 
 # Half a second of work, and the same for every robot of a configuration.
 _board_limits = lru_cache(maxsize=8)(servo.board_limits)
@@ -376,6 +379,118 @@ class Robot:
         """Straighten and shorten (or lengthen) the spring to a length; otherwise as `move_to`."""
         self.move_to((0.0, 0.0, length_mm), duration_s=duration_s, speed_mm_s=speed_mm_s)
 
+    def move_along(
+        self,
+        waypoints_mm: npt.ArrayLike,
+        *,
+        blend_mm: float = 0.0,
+        duration_s: float | None = None,
+        speed_mm_s: float | None = None,
+        model: str | None = None,
+        at_jump: Literal["refuse", "bridge"] = "refuse",
+    ) -> None:
+        """Move to the first of some positions as `move_to` does, then along the others.
+
+        Parameters
+        ----------
+        waypoints_mm
+            Positions of the spring's top in frame D, (m, 3), m ≥ 2; straight between
+            them in length and bending.
+        blend_mm
+            How far before a waypoint the motion may cut its corner, to pass it
+            without a stop. 0: it stops at each.
+        duration_s
+            Time from the first waypoint to the last; with neither this nor a speed,
+            the shortest that the configured speed, acceleration and jerk allow.
+        speed_mm_s
+            Constant speed of the spring's top between the ramps.
+        model
+            Tendon model; None takes the configured one.
+        at_jump
+            Where the model jumps: refuse the way, or bridge the jump at rest.
+
+        Raises
+        ------
+        InputError, UnreachableError, TrajectoryError
+            As `move_to`, and `setae.trajectory.along`.
+        """
+        points = finite_array("waypoints_mm", waypoints_mm, last_axis=3, what="x, y, z")
+        if points.ndim != 2 or len(points) < 2:
+            raise InputError(f"waypoints_mm has shape {points.shape}.", "Give two x, y, z or more.")
+        arcs = kinematics.inverse(points)
+        lengths_mm = workspace.require(arcs, self.config, model)
+        motion = trajectory.along(
+            arcs,
+            self.config.geometry,
+            model or self.config.motion.model,
+            limits=self._limits(self._path_speed(speed_mm_s, duration_s)),
+            blend_mm=blend_mm,
+            duration_s=duration_s,
+            speed_mm_s=speed_mm_s,
+            at_jump=at_jump,
+        )
+        self._told("move_along", waypoints_mm=points.tolist(), blend_mm=blend_mm,
+                   duration_s=duration_s, speed_mm_s=speed_mm_s, model=model,
+                   at_jump=at_jump)  # fmt: skip
+        self._move(lengths_mm[0], None, None)
+        self._follow(motion)
+
+    def circle(
+        self,
+        radius_mm: float,
+        height_mm: float,
+        *,
+        start_deg: float = 0.0,
+        turns: float = 1.0,
+        duration_s: float | None = None,
+        speed_mm_s: float | None = None,
+        model: str | None = None,
+        at_jump: Literal["refuse", "bridge"] = "refuse",
+    ) -> None:
+        """Move to a point beside the axis as `move_to` does, then round it in a circle.
+
+        The spring's length and bending stay the same, only its direction α turns.
+
+        Parameters
+        ----------
+        radius_mm, height_mm
+            Of the circle of the spring's top in frame D.
+        start_deg
+            Direction α in which it starts.
+        turns
+            How often round, positive from x towards y.
+        duration_s, speed_mm_s, model, at_jump
+            As in `move_along`. Under the model ``paper`` every circle jumps.
+
+        Raises
+        ------
+        InputError, UnreachableError, TrajectoryError
+            As `move_along`.
+        """
+        start_rad = math.radians(float(finite_array("start_deg", start_deg)))
+        radius = _positive("radius_mm", radius_mm)
+        arc = kinematics.inverse(
+            (radius * math.cos(start_rad), radius * math.sin(start_rad), height_mm)
+        )
+        lengths_mm = workspace.require(arc, self.config, model)
+        motion = trajectory.circle(
+            float(arc.length_mm),
+            float(arc.theta_rad),
+            self.config.geometry,
+            model or self.config.motion.model,
+            limits=self._limits(self._path_speed(speed_mm_s, duration_s)),
+            start_rad=start_rad,
+            turns=turns,
+            duration_s=duration_s,
+            speed_mm_s=speed_mm_s,
+            at_jump=at_jump,
+        )
+        self._told("circle", radius_mm=radius, height_mm=height_mm, start_deg=start_deg,
+                   turns=turns, duration_s=duration_s, speed_mm_s=speed_mm_s, model=model,
+                   at_jump=at_jump)  # fmt: skip
+        self._move(lengths_mm, None, None)
+        self._follow(motion)
+
     def probe(
         self,
         position_mm: npt.ArrayLike,
@@ -431,9 +546,9 @@ class Robot:
         final = segments[-1].target_ticks if segments else self._ticks_now()
 
         def extend() -> None:
-            self._queue(segments)
+            play = self._playing(segments)
             self._board.wait(
-                lambda: self._board.trip is not None or self._board.at_rest(final),
+                lambda: self._board.trip is not None or (play() and self._board.at_rest(final)),
                 duration_s + REPLY_S,
                 "the extension to end",
                 trips=True,
@@ -646,18 +761,44 @@ class Robot:
     ) -> None:
         self._board.require_holding()
         segments, duration_s = self._plan(lengths_mm, duration_s, speed_mm_s)
+        self._play(segments, duration_s)
+
+    def _play(self, segments: Sequence[Segment], duration_s: float) -> None:
+        """Have the board play segments, and wait until it has."""
         if not segments:
             return
-        self._queue(segments)
         final = segments[-1].target_ticks
+        play = self._playing(segments)
         self._board.wait(
-            lambda: self._board.at_rest(final), duration_s + REPLY_S, "the move to end"
+            lambda: play() and self._board.at_rest(final), duration_s + REPLY_S, "the move to end"
         )
 
-    def _queue(self, segments: list[Segment]) -> None:
-        """Hand segments to the link, which sends them as the board has room."""
-        for message in servo.segment_messages(segments, epoch=self.session.epoch):
-            self._board.send(message)
+    def _playing(self, segments: Sequence[Segment]) -> Callable[[], bool]:
+        """Make what hands segments to the link, call after call; True once all are.
+
+        The board holds fifty, which may be many seconds. It gets them about a second
+        ahead, so that it soon holds if the host dies.
+        """
+        waiting = deque(
+            servo.segment_messages(
+                segments, epoch=self.session.epoch, max_frames=_AHEAD_FRAMES // 2
+            )
+        )
+        begin_us = self.now_us
+        sent_us = 0
+
+        def play() -> bool:
+            nonlocal sent_us
+            while waiting:
+                frames = sum(part.duration_frames for part in waiting[0].segments)
+                ahead_us = sent_us - (self.now_us - begin_us)
+                if ahead_us + frames * SERVO_FRAME_US > _AHEAD_FRAMES * SERVO_FRAME_US:
+                    return False
+                sent_us += frames * SERVO_FRAME_US
+                self._board.send(waiting.popleft())
+            return True
+
+        return play
 
     def _plan(
         self,
@@ -681,10 +822,37 @@ class Robot:
         if self._ticks_for(lengths_mm) == self._ticks_now():
             return [], 0.0
         motion = trajectory.line(
-            self.lengths_mm, lengths_mm, max_speed_mm_s=limit, duration_s=duration_s
+            self.lengths_mm, lengths_mm, limits=self._limits(limit), duration_s=duration_s
         )
-        segments = self._servos.segments(motion.lengths_mm)
-        return list(segments), motion.duration_s
+        return self._packed(motion), motion.duration_s
+
+    def _path_speed(
+        self, speed_mm_s: float | None, duration_s: float | None
+    ) -> npt.NDArray[np.float64]:
+        """What limits the tendons on a way: the configured speed, unless time or speed is given."""
+        limit = self._servos.max_speed_mm_s
+        if speed_mm_s is None and duration_s is None:
+            limit = np.minimum(limit, self.config.motion.move_speed_mm_s)
+        return np.asarray(limit)
+
+    def _limits(self, speed_mm_s: npt.ArrayLike) -> trajectory.Limits:
+        motion = self.config.motion
+        return trajectory.Limits(
+            speed_mm_s=speed_mm_s,
+            acceleration_mm_s2=motion.acceleration_mm_s2,
+            jerk_mm_s3=motion.jerk_mm_s3,
+        )
+
+    def _packed(self, motion: trajectory.FrameTrajectory) -> list[Segment]:
+        """Segments for a motion that starts at the present pulses."""
+        return list(self._servos.segments(motion.lengths_mm, start_ticks=self._ticks_now()))
+
+    def _follow(self, motion: trajectory.FrameTrajectory) -> None:
+        """Play a motion through poses, each of which the board would take."""
+        segments = self._packed(motion)
+        for segment in segments:
+            self._require_allowed(segment.target_ticks)
+        self._play(segments, motion.duration_s)
 
     # ------------------------------------------------------------------- details
 
