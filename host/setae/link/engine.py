@@ -300,11 +300,10 @@ class Engine:
         self._open_if_settled()
 
     def _on_pong(self, message: Pong, now_us: int) -> None:
-        round_trip_us = self._timing.on_pong(message, now_us)
-        if round_trip_us is None:
-            return
         self._handshake.on_pong(message.token)
-        if self._handshake.settled and self.round_trip_us is None:
+        round_trip_us = self._timing.on_pong(message, now_us)
+        if round_trip_us is not None:
+            # It is known which ping was answered, however often commands were sent.
             self._reliable.timer.measure(round_trip_us)
             self._reliable.timer.recover()
         self._open_if_settled()

@@ -19,6 +19,7 @@ from setae.link.session import Session
 from setae_protocol.frame import HostDecoder, encode_host
 from setae_protocol.messages import (
     BoardMessage,
+    Disarm,
     Enable,
     Fault,
     MessageType,
@@ -44,16 +45,35 @@ class WithoutRecall(ModelTransport):
         super().send(kept)
 
 
-def test_a_slow_line_opens_a_session() -> None:
+@pytest.mark.parametrize("delay_us", [60_000, 350_000])
+def test_a_slow_line_opens_a_session(delay_us: int) -> None:
     """The handshake took the answer to its latest ping only, and sent one every 50 ms.
 
     So a line on which an answer takes longer than that never opened.
     """
     line = ModelTransport()
-    line.delay_us = 60_000
+    line.delay_us = delay_us
     session = Session(line, session_id=7)
-    session.open(3 * SECOND_US)
+    session.open(5 * SECOND_US)
     assert session.request(Enable(pulse_ticks=POSE)).state is TicketState.EXECUTED
+
+
+def test_a_line_that_becomes_slow_is_learnt() -> None:
+    """Each command was sent three times for ever.
+
+    Nobody can say which of several copies was answered, so a round trip longer
+    than the timeout was never measured.
+    """
+    line = ModelTransport()
+    session = Session(line, session_id=7)
+    session.open()
+    line.delay_us = 60_000
+    session.run_for(5 * SECOND_US)
+    session.request(Enable(pulse_ticks=POSE))
+    before = session.engine.statistics.frames_retransmitted
+    for _ in range(10):
+        session.request(Disarm(reserved=0))
+    assert session.engine.statistics.frames_retransmitted == before
 
 
 def test_an_earlier_hosts_refusal_is_no_verdict_on_our_command() -> None:
