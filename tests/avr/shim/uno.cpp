@@ -1,0 +1,164 @@
+#include "uno.h"
+
+extern "C" {
+#include <sim_interrupts.h>
+}
+
+#include <string.h>
+
+#include <algorithm>
+
+namespace setae {
+namespace uno {
+namespace {
+
+constexpr uint16_t kMcusr = 0x54;
+constexpr uint8_t kPowerOnReset = 1 << 0;
+constexpr uint8_t kExternalReset = 1 << 1;
+constexpr uint16_t kRamStart = 0x100;
+// Memory holds anything at power-on; no counter or pointer is likely to be that.
+constexpr uint8_t kPaint = 0xC5;
+// Section 7.7.1: four cycles to the vector, which simavr doesn't count.
+constexpr int kInterruptCycles = 4;
+constexpr Cycle kBurst = 1000000;
+
+const char* kNoNames[] = {nullptr};
+
+}  // namespace
+
+Uno::Uno(const std::string& elf_path)
+    : chip_(elf_path),
+      usart_(chip_),
+      sensor_(chip_),
+      twi_(chip_, sensor_),
+      pins_(chip_),
+      end_(chip_, [](Cycle) {}) {
+  avr_t* avr = chip_.avr();
+  listener_.uno = this;
+  listener_.io.kind = "uno";
+  listener_.io.avr = avr;
+  listener_.io.irq_names = kNoNames;
+  listener_.io.reset = on_reset;
+  // Last, so that simavr's own have done theirs.
+  avr_io_t* last = avr->io_port;
+  while (last->next != nullptr)
+    last = last->next;
+  last->next = &listener_.io;
+
+  for (int i = 0; i < avr->interrupts.vector_count; ++i) {
+    vectors_.push_back(std::make_unique<Vector>(Vector{this, avr->interrupts.vector[i]}));
+    avr_irq_register_notify(&avr->interrupts.vector[i]->irq[AVR_INT_IRQ_RUNNING], on_running,
+                            vectors_.back().get());
+  }
+  memset(avr->data + kRamStart, kPaint, avr->ramend + 1u - kRamStart);
+  avr_reset(avr);
+  chip_.set(kMcusr, kPowerOnReset);
+  resets_ = 0;
+}
+
+Uno::~Uno() {
+  // It is no peripheral that simavr may free.
+  for (avr_io_t* io = chip_.avr()->io_port; io != nullptr; io = io->next) {
+    if (io->next == &listener_.io)
+      io->next = nullptr;
+  }
+}
+
+void Uno::on_reset(avr_io_t* io) {
+  reinterpret_cast<Listener*>(io)->uno->reset_peripherals();
+}
+
+void Uno::reset_peripherals() {
+  ++resets_;
+  usart_.reset();
+  twi_.reset();
+  pins_.reset();
+  if (run_end_ > chip_.cycle())  // a reset empties simavr's list of events
+    end_.set(run_end_);
+}
+
+void Uno::press_reset() {
+  const Cycle now = chip_.cycle();
+  avr_reset(chip_.avr());
+  chip_.avr()->cycle = now;
+  chip_.set(kMcusr, chip_.get(kMcusr) | kExternalReset);
+}
+
+void Uno::on_running(avr_irq_t*, uint32_t running, void* entry) {
+  const Vector& vector = *static_cast<Vector*>(entry);
+  avr_t* avr = vector.uno->chip_.avr();
+  if (running) {
+    avr->cycle += kInterruptCycles;
+    avr->run_cycle_count -= std::min<avr_cycle_count_t>(avr->run_cycle_count, kInterruptCycles);
+    avr->run_cycle_count = std::max<avr_cycle_count_t>(avr->run_cycle_count, 1);
+    return;
+  }
+  // After RETI the part runs one more instruction, simavr 1.6 two.
+  if (avr->interrupt_state == -2)
+    avr->interrupt_state = -1;
+  if (vector.vector->raise_sticky && avr_regbit_get(avr, vector.vector->raised))
+    avr_raise_interrupt(avr, vector.vector);
+}
+
+void Uno::run(Cycle end, bool stop_after_frame) {
+  avr_t* avr = chip_.avr();
+  run_end_ = end;
+  if (chip_.cycle() >= end)
+    return;
+  end_.set(end);
+  size_t seen = usart_.sent_by_board().size();
+  while (chip_.cycle() < end) {
+    // simavr runs instructions in a burst until its next event.
+    avr->run_cycle_limit = watching_ ? 1 : kBurst;
+    const Cycle before = chip_.cycle();
+    avr_run(avr);
+    if (chip_.cycle() < before)
+      avr->cycle = before;
+    if (watching_) {
+      const bool off = !avr->sreg[S_I];
+      if (off && !was_off_) {
+        off_since_ = before;
+        off_at_ = avr->pc;
+      } else if (!off && was_off_ && chip_.cycle() - off_since_ > longest_off_) {
+        longest_off_ = chip_.cycle() - off_since_;
+        longest_off_at_ = off_at_;
+      }
+      was_off_ = off;
+    }
+    if (stop_after_frame && usart_.sent_by_board().size() > seen) {
+      seen = usart_.sent_by_board().size();
+      if (usart_.sent_by_board().back().value == 0)
+        break;
+    }
+  }
+  end_.cancel();
+}
+
+void Uno::watch_interrupts(bool on) {
+  watching_ = on;
+  was_off_ = !chip_.avr()->sreg[S_I];
+  off_since_ = chip_.cycle();
+  longest_off_ = 0;
+}
+
+int Uno::stack_bytes() const {
+  const avr_t* avr = const_cast<Chip&>(chip_).avr();
+  // Up from the variables' end: what was never touched still has its paint.
+  uint16_t longest_start = 0, longest = 0, start = kRamStart, run = 0;
+  for (uint16_t address = kRamStart; address <= avr->ramend; ++address) {
+    if (avr->data[address] == kPaint) {
+      if (run++ == 0)
+        start = address;
+      if (run > longest) {
+        longest = run;
+        longest_start = start;
+      }
+    } else {
+      run = 0;
+    }
+  }
+  return avr->ramend + 1 - (longest_start + longest);
+}
+
+}  // namespace uno
+}  // namespace setae

@@ -1,0 +1,69 @@
+"""From the pressure to frozen pulses."""
+
+from __future__ import annotations
+
+import random
+
+from tests.avr.driver import Driver, Ticks, ramp
+from tests.avr.simavr import CYCLES_PER_US, FRAME_CYCLES, Sample
+
+from setae_protocol.messages import PRESSURE_LSB_PER_HPA, Guard, State, TripCause
+
+START: Ticks = (1500, 1500, 1500, 1500)
+END: Ticks = (3000, 3000, 3000, 3000)
+REST_HPA = 1013.25
+TOUCH_HPA = 1040.0
+
+
+def touch(driver: Driver, rng: random.Random) -> int:
+    """Move with a guard, touch at a random moment; return the cycle of the touch."""
+    driver.guard(15)
+    driver.queue(ramp(START, END, 45))
+    driver.wait_for(State.MOVING)
+    driver.session.run_until(
+        lambda: driver.reports[-1].telemetry.guard is Guard.ARMED, 100_000, what="armed"
+    )
+    touched = driver.uno.cycle + rng.randrange(20_000, 300_000) * CYCLES_PER_US
+    driver.uno.set_pressure(TOUCH_HPA, from_cycle=touched)
+    driver.wait_for(State.TRIPPED)
+    driver.session.run_for(120_000)
+    return touched
+
+
+def test_a_contact_freezes_the_next_frame_and_its_record_arrives(driver: Driver) -> None:
+    rng = random.Random(5)
+    driver.enable(START)
+    for rate in (0.97, 0.99, 1.0, 1.01, 1.03):
+        driver.uno.set_sensor_rate(rate)
+        touched = touch(driver, rng)
+
+        record = driver.trips[-1].record
+        assert record.cause is TripCause.CONTACT
+        assert record.pressure_raw == round(TOUCH_HPA * PRESSURE_LSB_PER_HPA)
+        assert record.baseline_raw == round(REST_HPA * PRESSURE_LSB_PER_HPA)
+
+        frames = driver.frames()
+        frozen = frames[-1].ticks
+        assert frozen not in (tuple(map(float, START)), tuple(map(float, END)))
+        first = next(frame for frame in frames if frame.ticks == frozen)
+        assert tuple(map(float, record.pulse_ticks[-1])) == frozen
+        sample: Sample = next(sample for sample in driver.samples() if sample.ready >= touched)
+        # The frame in which the sample was read is shown again: the next one stands still.
+        assert first.first_rise - sample.ready < 1.1 * FRAME_CYCLES
+
+        driver.uno.set_pressure(REST_HPA)
+        driver.session.run_for(100_000)
+        driver.resume()
+        driver.play([START], frames_each=20)
+
+
+def test_a_touch_that_is_too_weak_does_not_stop(driver: Driver) -> None:
+    driver.enable(START)
+    driver.guard(15)
+    driver.queue(ramp(START, END, 45))
+    driver.uno.set_pressure(REST_HPA + 14.5, from_cycle=driver.uno.cycle + 8_000_000)
+    driver.wait_for(State.MOVING)
+    driver.wait_for(State.HOLDING)
+    driver.session.run_for(60_000)
+    assert driver.trips == []
+    assert driver.frames()[-1].ticks == tuple(map(float, END))
