@@ -21,8 +21,10 @@ constexpr uint8_t kPressOutXl = 0x28;  // the high byte last: reading it frees t
 constexpr uint32_t kRetryUs = 100000;
 constexpr uint32_t kSilentUs = 100000;
 // 75 Hz is 13.3 ms, 12.9 with a fast oscillator. To look earlier only loads the bus; from then
-// on the status is read without a break, so that a sample waits 0.2 ms at most.
-constexpr uint32_t kEarliestUs = 12400;
+// on the status is read without a break. Counted from where the last sample was seen, and with
+// room for the transfers: each look must begin a little earlier than the sample before, or they
+// fall behind the sensor, up to a whole period, and nobody notices.
+constexpr uint32_t kEarliestUs = 12000;
 
 }  // namespace
 
@@ -79,6 +81,7 @@ void Lps33hw::on_done(uint32_t now_us, SensorReading& reading) {
     case Step::kStatus:
       if (data[0] & kPressureReady) {
         step_ = Step::kData;
+        due_us_ = now_us + kEarliestUs;
         return twi_.start_read(address_, kPressOutXl, 3);
       }
       if (now_us - sampled_us_ > kSilentUs)
@@ -93,7 +96,6 @@ void Lps33hw::on_done(uint32_t now_us, SensorReading& reading) {
       reading.sampled = ready_;
       sampled_us_ = now_us;
       step_ = Step::kWait;
-      due_us_ = now_us + kEarliestUs;
       return;
     }
     default:
