@@ -124,7 +124,6 @@ class Handshake:
         """Ask, now and then, which session the board is in. A reset board says 0."""
         if now_us < self._probe_at_us:
             return
-        self._hello_token = None
         self._say_hello(0, now_us)
         self._probe_at_us = now_us + _SILENCE_US
 

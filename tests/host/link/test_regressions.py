@@ -12,7 +12,7 @@ from tests.host.link.model import (
 )
 
 from setae.board import Board
-from setae.errors import DeadlineError, FaultError
+from setae.errors import BoardResetError, DeadlineError, FaultError
 from setae.link.events import FaultReported, Refused, TicketState, Tripped
 from setae.link.handshake import Phase
 from setae.link.session import Session
@@ -74,6 +74,20 @@ def test_a_line_that_becomes_slow_is_learnt() -> None:
     for _ in range(10):
         session.request(Disarm(reserved=0))
     assert session.engine.statistics.frames_retransmitted == before
+
+
+def test_a_reset_is_noticed_on_a_slow_line() -> None:
+    """Only the answer to the latest question counted, and the next was asked before it came.
+
+    So the reset was reported as a lost line, four seconds later.
+    """
+    line = ModelTransport()
+    line.delay_us = 100_000
+    session = Session(line, session_id=7)
+    session.open()
+    line.board.reset()
+    with pytest.raises(BoardResetError):
+        session.run_for(SECOND_US)
 
 
 def test_an_earlier_hosts_refusal_is_no_verdict_on_our_command() -> None:
