@@ -19,7 +19,7 @@ alphas = st.floats(-math.pi, math.pi)
 lengths = st.floats(20, 70)
 tip_offsets = st.floats(0, 100)
 
-D = Geometry().tendon_radius_mm
+D = Geometry().tendon_radii_mm[0]
 
 
 def close(actual: object, expected: object) -> None:
@@ -69,6 +69,8 @@ def test_equations_1_to_3_transform_from_base_to_top(
     arc, r = arc_of(length, theta, alpha)
     d_t_c = rotate("z", alpha) @ shift(x=r)  # 1
     c_t_u = rotate("y", theta) @ shift(x=-r) @ rotate("z", -alpha)  # 2
+    close(kinematics.transform_to_centre(arc), d_t_c)
+    close(np.linalg.inv(kinematics.transform_to_centre(arc)) @ kinematics.transform(arc), c_t_u)
     close(kinematics.transform(arc), d_t_c @ c_t_u)
     close(kinematics.transform(arc), equation_3(theta, alpha, r))
 
@@ -140,8 +142,9 @@ def test_equation_11_attachments_move_with_the_top(
 ) -> None:
     arc, r = arc_of(length, theta, alpha)
     low, high = attachments(theta, alpha, r)
-    ones = np.ones((4, 1))
-    close((np.concatenate([low, ones], axis=1) @ kinematics.transform(arc).T)[:, :3], high)
+    lower, upper = kinematics.attachments(arc, Geometry())
+    close(lower, low)
+    close(upper, high)
 
 
 @given(lengths, thetas, alphas)

@@ -111,6 +111,27 @@ def test_three_tendons_at_any_angles() -> None:
     assert tendons.lengths(arc, geometry, "paper").shape == (3,)
 
 
+@pytest.mark.parametrize("model", TENDON_MODELS)
+def test_each_tendon_may_have_a_distance_of_its_own(model: str) -> None:
+    radii = (8.3, 6.0, 8.9, 6.0, 7.0)
+    angles = (0.0, 1.0, 2.5, 4.0, 5.0)
+    arc = Arc.from_angles(
+        length_mm=[[30, 50, 70]], theta_rad=1.3, alpha_rad=[[-2.0], [0.4], [1.3], [2.2]]
+    )
+    geometry = Geometry(tendon_radius_mm=radii, tendon_angles_rad=angles)
+    q = tendons.lengths(arc, geometry, model)
+    assert q.shape == (4, 3, 5)
+    for i, (radius, angle) in enumerate(zip(radii, angles, strict=True)):
+        alone = Geometry(tendon_radius_mm=radius, tendon_angles_rad=(angle,))
+        np.testing.assert_allclose(
+            q[..., i], tendons.lengths(arc, alone, model)[..., 0], atol=1e-12
+        )
+        one = tendons.lengths(arc[2, 1], geometry, model)
+        np.testing.assert_allclose(one, q[2, 1], atol=1e-12)
+    back = kinematics.forward(q, geometry, model, near=arc)
+    np.testing.assert_allclose(back.top_mm, arc.top_mm, atol=1e-9)
+
+
 def test_turning_the_robot_by_a_tendon_turns_the_lengths() -> None:
     alpha = np.linspace(0.1, 6.2, 40)
     one = Arc.from_angles(length_mm=55, theta_rad=1.0, alpha_rad=alpha)

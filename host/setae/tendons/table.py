@@ -5,8 +5,7 @@ Interpolates with two continuous derivatives.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +13,9 @@ import numpy.typing as npt
 from setae.arc import FloatArray
 
 __all__ = ["Axis", "Table"]
+
+_BLOCK = 512
+"""Places that are computed at once: the 64 coefficients of each stay in the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,21 +28,22 @@ class Axis:
         The first and the last place.
     count
         How many; at least 5.
+    per_step
+        Steps for one unit of the variable.
     """
 
     low: float
     high: float
     count: int
+    per_step: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "per_step", (self.count - 1) / (self.high - self.low))
 
     @property
     def places(self) -> FloatArray:
         """The places, shape (count,)."""
         return np.linspace(self.low, self.high, self.count)
-
-    @property
-    def per_step(self) -> float:
-        """Steps for one unit of the variable."""
-        return (self.count - 1) / (self.high - self.low)
 
 
 class Table:
@@ -59,112 +62,100 @@ class Table:
         for axis in range(3):
             weights = _interpolation(values.shape[axis])
             values = np.moveaxis(np.tensordot(weights, values, axes=(1, axis)), 0, axis)
-        self._flat = np.ascontiguousarray(values).reshape(-1)
-        self._plain: list[float] = self._flat.tolist()
+        self._grid = np.ascontiguousarray(values)
+        self._flat = self._grid.reshape(-1)
         _, rows, columns = values.shape
-        self._strides = (rows * columns, columns, 1)
         steps = np.arange(4)
         # From a cell's first coefficient to its 4 × 4 × 4.
         self._offsets: npt.NDArray[np.intp] = (
-            steps[:, None, None] * self._strides[0] + steps[:, None] * columns + steps
+            (steps[:, None, None] * rows + steps[:, None]) * columns + steps
         ).reshape(-1, 1)
+        self._strides = np.array([rows * columns, columns, 1])
+        self._lows = np.array([[axis.low] for axis in axes])
+        self._per_step = np.array([[axis.per_step] for axis in axes])
+        self._last_cells = np.array([[axis.count - 2] for axis in axes])
 
     def __call__(self, *variables: FloatArray) -> FloatArray:
         """Interpolate at places (p,) inside the grid."""
-        grid, weights = self._around(variables)
-        for weight in reversed(weights):
-            grid = _weighted(grid, weight(0))
-        return grid
+        places = np.stack(variables)
+        value = np.empty(places.shape[1])
+        for first in range(0, len(value), _BLOCK):
+            part = slice(first, first + _BLOCK)
+            grid, t = self._around(places[:, part])
+            value[part] = _weighted(grid, _weights(t))
+        return value
 
     def with_gradient(self, *variables: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Interpolate, and derive by the variables: shapes (p,) and (3, p)."""
-        grid, weights = self._around(variables)
-        value = grid
-        for weight in reversed(weights):
-            value = _weighted(value, weight(0))
-        gradient = np.empty((3, value.shape[-1]))
-        for by in range(3):
-            slope = grid
-            for axis in (2, 1, 0):
-                slope = _weighted(slope, weights[axis](int(axis == by)))
-            gradient[by] = slope * self.axes[by].per_step
-        return value, gradient
+        grid, t = self._around(np.stack(variables))
+        weights, slopes = _weights(t), _slopes(t)
+        gradient = np.empty(t.shape)
+        for by, axis in enumerate(self.axes):
+            mixed = weights.copy()
+            mixed[:, by] = slopes[:, by]
+            gradient[by] = _weighted(grid, mixed) * axis.per_step
+        return _weighted(grid, weights), gradient
 
-    def one(self, *variables: float) -> float:
-        """Interpolate at one place, without what numpy costs for each."""
-        first, weights = 0, []
-        for variable, axis, stride in zip(variables, self.axes, self._strides, strict=True):
-            place = (variable - axis.low) * axis.per_step
-            cell = min(max(int(place), 0), axis.count - 2)
-            first += cell * stride
-            t = place - cell
-            s = 1 - t
-            third = t * t * t / 6
-            square = t * t / 2
-            weights.append((s * s * s / 6, 2 / 3 - 2 * square + 3 * third,
-                            1 / 6 + t / 2 + square - 3 * third, third))  # fmt: skip
-        plain, (row, column, _) = self._plain, self._strides
-        w, x, y, z = weights[2]
-        total = 0.0
-        for a in weights[0]:
-            at, part = first, 0.0
-            for b in weights[1]:
-                part += b * (
-                    w * plain[at] + x * plain[at + 1] + y * plain[at + 2] + z * plain[at + 3]
-                )
-                at += column
-            total += a * part
-            first += row
-        return total
+    def row(self, first: float, second: float) -> list[float]:
+        """Interpolate by the first two variables: what `on_row` takes."""
+        i, a = _plain_weights(first, self.axes[0])
+        j, b = _plain_weights(second, self.axes[1])
+        weights = np.array([x * y for x in a for y in b])
+        row: list[float] = (weights @ self._grid[i : i + 4, j : j + 4].reshape(16, -1)).tolist()
+        return row
 
-    def _around(self, variables: Sequence[FloatArray]) -> tuple[FloatArray, list[_Weights]]:
-        """The coefficients around each place, shape (4, 4, 4, p), and their weights."""
-        first: npt.NDArray[np.intp] = np.zeros(variables[0].shape, dtype=np.intp)
-        weights = []
-        for variable, axis, stride in zip(variables, self.axes, self._strides, strict=True):
-            place = (variable - axis.low) * axis.per_step
-            cell = place.astype(np.intp)
-            np.clip(cell, 0, axis.count - 2, out=cell)
-            weights.append(_Weights(place - cell))
-            first += cell * stride
+    def on_row(self, row: list[float], third: float) -> float:
+        """Interpolate by the third variable, without what numpy costs for a single place."""
+        k, (a, b, c, d) = _plain_weights(third, self.axes[2])
+        return a * row[k] + b * row[k + 1] + c * row[k + 2] + d * row[k + 3]
+
+    def _around(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Coefficients around places (3, p), shape (4, 4, 4, p); t in their cells (3, p)."""
+        t = (places - self._lows) * self._per_step
+        cell = t.astype(np.intp)
+        np.clip(cell, 0, self._last_cells, out=cell)
+        t -= cell
+        first = self._strides @ cell
         # In range by construction; "clip" saves the check.
         grid = np.take(self._flat, first + self._offsets, mode="clip")
-        return grid.reshape(4, 4, 4, -1), weights
+        return grid.reshape(4, 4, 4, -1), t
 
 
-class _Weights:
-    """Weights of four neighbouring B-splines, by the place t in the cell between the middle two."""
+def _weights(t: FloatArray) -> FloatArray:
+    """Weights of four neighbouring B-splines, t behind the second's middle: (3, p) → (4, 3, p)."""
+    s, square = 1 - t, t * t
+    result = np.empty((4, *t.shape))
+    result[0] = s * s * s / 6
+    result[3] = square * t / 6
+    result[1] = 2 / 3 - square + 3 * result[3]
+    # The four add up to 1.
+    result[2] = 1 - result[0] - result[1] - result[3]
+    return result
 
-    def __init__(self, t: FloatArray) -> None:
-        self._t = t
 
-    def __call__(self, derivative: int) -> FloatArray:
-        """Shape (4, p)."""
-        t = self._t
-        result = np.empty((4, len(t)))
-        s = 1 - t
-        square = t * t
-        if derivative:
-            result[0] = -0.5 * s * s
-            result[1] = 1.5 * square - 2 * t
-            result[2] = 0.5 + t - 1.5 * square
-            result[3] = 0.5 * square
-            return result
-        cube = square * t
-        result[0] = s * s * s / 6
-        result[1] = 2 / 3 - square + cube / 2
-        result[3] = cube / 6
-        # The four add up to 1.
-        result[2] = 1 - result[0] - result[1] - result[3]
-        return result
+def _slopes(t: FloatArray) -> FloatArray:
+    """Derivatives of `_weights` by t."""
+    s, square = 1 - t, t * t
+    return np.stack([-s * s / 2, 1.5 * square - 2 * t, 0.5 + t - 1.5 * square, square / 2])
+
+
+def _plain_weights(variable: float, axis: Axis) -> tuple[int, tuple[float, float, float, float]]:
+    """Like `_weights`, for one place and one variable: its cell and the four weights."""
+    place = (variable - axis.low) * axis.per_step
+    cell = min(max(int(place), 0), axis.count - 2)
+    t = place - cell
+    s = 1 - t
+    square = t * t
+    first, last = s * s * s / 6, square * t / 6
+    second = 2 / 3 - square + 3 * last
+    return cell, (first, second, 1 - first - second - last, last)
 
 
 def _weighted(grid: FloatArray, weights: FloatArray) -> FloatArray:
-    """Sum over the last axis but one: (..., 4, p) and (4, p) → (..., p)."""
-    total: FloatArray = grid[..., 0, :] * weights[0]
-    for k in range(1, 4):
-        total += grid[..., k, :] * weights[k]
-    return total
+    """Sum coefficients (4, 4, 4, p) with weights (4, 3, p): (p,)."""
+    planes = np.einsum("abcp,cp->abp", grid, weights[:, 2])
+    rows = np.einsum("abp,bp->ap", planes, weights[:, 1])
+    return np.asarray(np.einsum("ap,ap->p", rows, weights[:, 0]))
 
 
 def _interpolation(count: int) -> FloatArray:

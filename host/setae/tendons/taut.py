@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -26,8 +27,8 @@ from setae.tendons.table import Axis, Table
 
 __all__ = ["MODEL"]
 
-TOLERANCE_MM = 0.003
-"""Largest error of the table, at the places where it is checked."""
+TOLERANCE = 5e-5
+"""Largest error of a table, of the longest length: 0.0035 mm for the paper's robot."""
 _SIZES = ((14, 20, 30), (20, 30, 46), (28, 44, 68))
 """Places in L, θ and cos ψ: the first that suffices."""
 _TINY = 1e-150
@@ -54,10 +55,11 @@ class _Detour:
 
     def _make(self) -> Table | None:
         random = np.random.default_rng(0)
-        length = random.uniform(self.shortest_mm, self.longest_mm, 300)
-        theta = self.most_bent_rad * np.sqrt(random.uniform(0.0, 1.0, 300))
-        # Closer where it is hardest: near the bending plane.
-        cosine = 1 - random.uniform(0.0, math.sqrt(2), 300) ** 2
+        # Closer together where it is hardest: short, bent, near the bending plane.
+        a, b, c = random.uniform(0.0, 1.0, (3, 400))
+        length = self.shortest_mm + (self.longest_mm - self.shortest_mm) * a**2
+        theta = self.most_bent_rad * (1 - b**2)
+        cosine = 1 - 2 * c**2
         length = self.at_least(length, theta)
         depth = bore.depth(length, theta, cosine, self.d_mm, self.bore_mm)
         touching = depth > 0
@@ -66,7 +68,7 @@ class _Detour:
         for size in _SIZES:
             table = self._filled(size)
             error = np.abs(depth[touching] ** 2 * table(*places) - expected)
-            if error.max(initial=0.0) <= TOLERANCE_MM:
+            if error.max(initial=0.0) <= TOLERANCE * self.longest_mm:
                 return table
         return None
 
@@ -161,16 +163,23 @@ class _Detour:
             & (theta <= self.most_bent_rad)
         )
 
-    def one(self, length: float, theta: float, cosine: float, depth: float) -> float:
-        """Compute the detour of a single tendon whose depth is above 0, in mm."""
+    def of_arc(self, length: float, theta: float) -> Callable[[float, float], float]:
+        """For one arc: compute a tendon's detour from its cos ψ and depth (above 0), in mm."""
+        table = self.table
         if (
-            self.table is not None
+            table is not None
             and self.shortest_mm <= length <= self.longest_mm
             and theta <= self.most_bent_rad
         ):
-            return depth * depth * self.table.one(length, theta, cosine)
-        places = np.array([length]), np.array([theta]), np.array([cosine])
-        return float(self._exact(*places)[0])
+            row, on_row = table.row(length, theta), table.on_row
+            return lambda cosine, depth: depth * depth * on_row(row, cosine)
+        arc = np.array([length]), np.array([theta])
+
+        def exact(cosine: float, depth: float) -> float:
+            del depth  # it is found again
+            return float(self._exact(*arc, np.array([cosine]))[0])
+
+        return exact
 
 
 @lru_cache(maxsize=16)
@@ -190,14 +199,17 @@ class _Bore:
         Where a tendon's centre touches the wall.
     detours
         One for each distance from the axis that occurs.
+    of_tendons
+        Each tendon's.
     kinds : ndarray of int, shape (n,)
-        Which of them is each tendon's.
+        Which of `detours` that is.
     holes_mm : ndarray, shape (n,)
         Each tendon's distance from the axis, with a gap to the wall.
     """
 
     radius_mm: float
     detours: tuple[_Detour, ...]
+    of_tendons: tuple[_Detour, ...]
     kinds: npt.NDArray[np.intp]
     holes_mm: FloatArray
 
@@ -211,8 +223,9 @@ def _bore(geometry: Geometry) -> _Bore:
         _detour(d, radius, geometry.min_length_mm, geometry.free_length_mm, geometry.max_bend_rad)
         for d in distinct
     )
-    kinds = np.array([distinct.index(d) for d in holes])
-    return _Bore(radius, detours, kinds, np.array(holes))
+    kinds = [distinct.index(d) for d in holes]
+    of_tendons = tuple(detours[kind] for kind in kinds)
+    return _Bore(radius, detours, of_tendons, np.array(kinds), np.array(holes))
 
 
 def _lengths(arc: Arc, geometry: Geometry) -> FloatArray:
@@ -220,6 +233,7 @@ def _lengths(arc: Arc, geometry: Geometry) -> FloatArray:
     if arc.shape == ():
         x, y = arc.bend_rad.tolist()
         return np.array(_one(float(arc.length_mm), x, y, geometry))
+    count = len(tendons.d_mm)
     beside_mm2 = wall.radius_mm**2 - wall.holes_mm**2
 
     def compute(length: FloatArray, bend: FloatArray, result: FloatArray) -> None:
@@ -242,18 +256,17 @@ def _lengths(arc: Arc, geometry: Geometry) -> FloatArray:
         np.subtract(towards, depth, out=depth)
         apart = wall.detours[0].at_least(length, theta)
         depth += (apart * versine / theta)[:, np.newaxis]
-        pose, tendon = np.nonzero(depth > 0)
+        touching = np.flatnonzero(depth > 0)
         for kind, detour in enumerate(wall.detours):
+            at = touching
             if len(wall.detours) > 1:
-                chosen = wall.kinds[tendon] == kind
-                at = pose[chosen], tendon[chosen]
-            else:
-                at = pose, tendon
-            if len(at[0]):
-                places = apart[at[0]], theta[at[0]], cosine[at]
-                result[at] += detour(*places, depth[at])
+                at = touching[wall.kinds[touching % count] == kind]
+            if len(at):
+                pose = at // count
+                places = apart[pose], theta[pose], cosine.reshape(-1)[at]
+                result.reshape(-1)[at] += detour(*places, depth.reshape(-1)[at])
 
-    return in_blocks(arc, (len(tendons.d_mm),), compute)
+    return in_blocks(arc, (count,), compute)
 
 
 def _one(length: float, x: float, y: float, geometry: Geometry) -> list[float]:
@@ -264,17 +277,20 @@ def _one(length: float, x: float, y: float, geometry: Geometry) -> list[float]:
     versine = 2 * math.sin(theta / 4) ** 2
     apart = max(length, bore.LEAST_RADIUS * wall.radius_mm * theta)
     sagitta = apart * versine / theta
+    square = wall.radius_mm**2
+    of_arc: dict[float, Callable[[float, float], float]] = {}
     result = []
-    for (d, ux, uy), kind in zip(layout(geometry).points, wall.kinds.tolist(), strict=True):
-        detour = wall.detours[kind]
+    for (d, ux, uy), detour in zip(layout(geometry).points, wall.of_tendons, strict=True):
         towards = x * ux + y * uy
         tendon = (length - d * towards) * shrink
         cosine = towards / theta
-        hole = detour.d_mm * cosine
-        depth = sagitta + hole * (1 - versine)
-        depth -= math.sqrt(wall.radius_mm**2 - detour.d_mm**2 + hole * hole)
+        d = detour.d_mm
+        hole = d * cosine
+        depth = sagitta + hole * (1 - versine) - math.sqrt(square - d * d + hole * hole)
         if depth > 0:
-            tendon += detour.one(apart, theta, cosine, depth)
+            if d not in of_arc:
+                of_arc[d] = detour.of_arc(apart, theta)
+            tendon += of_arc[d](cosine, depth)
         result.append(tendon)
     return result
 
