@@ -7,10 +7,12 @@ from tests.avr.driver import Driver
 from tests.avr.simavr import CYCLES_PER_US, Uno
 
 from setae.errors import RefusedError
+from setae_protocol.frame import encode_host
 from setae_protocol.messages import (
     PRESSURE_LSB_PER_HPA,
     Fault,
     Guard,
+    ReadLimits,
     Sensor,
     State,
 )
@@ -132,3 +134,15 @@ def test_pressure_is_read_to_the_last_bit(driver: Driver) -> None:
         driver.uno.set_pressure(raw / PRESSURE_LSB_PER_HPA)
         driver.session.run_for(100_000)
         assert _told_raw(driver)[-1] == raw
+
+
+def test_a_busy_loop_is_no_broken_bus(driver: Driver) -> None:
+    """A transfer had 1 ms in all; with messages to decode it took longer: a fault where armed."""
+    _arm(driver)
+    before = len(driver.reports)
+    # The line is full in both directions.
+    question = encode_host(ReadLimits(token=0), session=driver.session_id)
+    driver.uno.send(question * 2000)
+    driver.session.run_for(1_000_000)
+    assert {event.telemetry.sensor for event in driver.reports[before:]} == {Sensor.OK}
+    assert driver.faults == []

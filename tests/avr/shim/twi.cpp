@@ -20,7 +20,7 @@ constexpr uint8_t kTwwc = 1 << 3;
 constexpr uint8_t kTwen = 1 << 2;
 constexpr uint8_t kTwie = 1 << 0;
 
-// Tables 21-3 and 21-4.
+// Tables 22-2 and 22-3.
 constexpr uint8_t kStarted = 0x08;
 constexpr uint8_t kStartedAgain = 0x10;
 constexpr uint8_t kWriteAck = 0x18;
@@ -76,7 +76,7 @@ void Twi::reset() {
   chip_.set(kPortC, 0);
 }
 
-// Section 21.5.2.
+// Section 22.5.2.
 Cycle Twi::clock_cycles() const {
   return 16 + (2u * chip_.get(kTwbr) << (2 * (chip_.get(kTwsr) & 3)));
 }

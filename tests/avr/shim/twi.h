@@ -1,4 +1,4 @@
-// The I2C master, and the bus with one slave. Data sheet section 21: bit rate, status codes,
+// The I2C master, and the bus with one slave. Data sheet section 22: bit rate, status codes,
 // TWINT. Port C is here too, since a stuck bus is freed by clocking its pins by hand.
 #pragma once
 

@@ -24,7 +24,7 @@ constexpr uint8_t kTransmitEnable = 1 << 3;
 constexpr uint8_t kUcsrAWritable = 0x03;
 
 constexpr int kFrameBits = 10;
-// The stop bit is decided at its tenth of sixteen samples (figure 19-6).
+// The stop bit is decided at its tenth of sixteen samples (figure 20-6).
 constexpr double kStopSampleBits = 9.625;
 
 }  // namespace
@@ -93,7 +93,7 @@ void Usart::start_bit() {
     expect_next();
     return;
   }
-  // Section 19.7.4: buffer and shift register full, and one more frame begins.
+  // Section 20.7.4: buffer and shift register full, and one more frame begins.
   if (shift_full_ && buffer_.size() == 2) {
     shift_full_ = false;
     lost_ = true;

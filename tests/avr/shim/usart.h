@@ -1,4 +1,4 @@
-// USART0 and the line to it. Data sheet section 19: frames of exactly 10 bits, two receive
+// USART0 and the line to it. Data sheet section 20: frames of exactly 10 bits, two receive
 // buffers and a shift register, overrun and frame error.
 #pragma once
 

@@ -13,7 +13,8 @@ constexpr uint32_t kClockHz = 400000;
 constexpr uint8_t kBitRate = (F_CPU / kClockHz - 16) / 2;  // data sheet section 21.5.2
 static_assert(F_CPU / (16 + 2UL * kBitRate) <= kClockHz, "faster than the sensor allows");
 
-// The longest transfer has 7 bytes: 0.16 ms, and as much again for a busy loop.
+// For one step on the bus: a byte takes 23 us. Not for a whole transfer, which lasts as long as
+// the loop has other things to do between its steps.
 constexpr uint16_t kDeadlineTicks = 2000;  // 1 ms
 
 constexpr uint8_t kGo = _BV(TWINT) | _BV(TWEN);
@@ -47,21 +48,21 @@ void Twi::start(uint8_t address, uint8_t reg, uint8_t size, bool reading) {
   reg_sent_ = false;
   begun_ = false;
   running_ = true;
-  begun_ticks_ = servo_pulses::ticks();
+  step_ticks_ = servo_pulses::ticks();
 }
 
 Twi::Result Twi::poll() {
   if (!running_)
     return Result::kIdle;
-  if (!begun_) {
-    if ((TWCR & _BV(TWSTO)) == 0) {  // the last transfer's STOP is out
-      TWCR = kGo | _BV(TWSTA);
-      begun_ = true;
-    }
-  } else if (TWCR & _BV(TWINT)) {
+  const uint16_t now_ticks = servo_pulses::ticks();
+  if (!begun_ && (TWCR & _BV(TWSTO)) == 0) {  // the last transfer's STOP is out
+    TWCR = kGo | _BV(TWSTA);
+    begun_ = true;
+    step_ticks_ = now_ticks;
+  } else if (begun_ && (TWCR & _BV(TWINT))) {
+    step_ticks_ = now_ticks;
     return advance(TW_STATUS);
-  }
-  if (static_cast<uint16_t>(servo_pulses::ticks() - begun_ticks_) > kDeadlineTicks) {
+  } else if (static_cast<uint16_t>(now_ticks - step_ticks_) > kDeadlineTicks) {
     return finish(Result::kFailed);
   }
   return Result::kBusy;

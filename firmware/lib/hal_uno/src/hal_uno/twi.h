@@ -1,5 +1,5 @@
-// One I2C register transfer at a time, advanced by polling: no call waits, and a transfer that
-// takes too long is given up. (The Arduino Wire library waits for ever on a stuck bus.)
+// One I2C register transfer at a time, advanced by polling: no call waits, and a transfer with
+// a step that takes too long is given up. (The Arduino Wire library waits for ever on a stuck bus.)
 #pragma once
 
 #include <stdint.h>
@@ -43,7 +43,7 @@ class Twi {
   bool running_ = false;
   bool begun_ = false;  // the START is on its way
   bool reg_sent_ = false;
-  uint16_t begun_ticks_ = 0;
+  uint16_t step_ticks_ = 0;  // when the step on the bus began
   uint8_t data_[kReadMax] = {};
 };
 
