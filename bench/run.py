@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # The oracle that judges explorations is the tests' own.
 sys.path.insert(0, str(ROOT))
 
-from bench import elf  # noqa: E402  # needs the path above
+from bench import elf, kinematics  # noqa: E402  # needs the path above
 from tests.system import oracle  # noqa: E402
 
 from setae import rig  # noqa: E402
@@ -175,12 +175,32 @@ def _judged() -> list[oracle.Judgement]:
     return judged
 
 
+def kinematics_speed() -> Iterable[Figure]:
+    """How fast positions become tendon lengths, for arrays and for one pose."""
+    load_1 = f"median of {kinematics.RUNS}, one core, load of the machine {os.getloadavg()[0]:.1f}"
+    for model in ("parallel", "paper", "taut"):
+        yield Figure(
+            f"ik_{model}_poses_per_s",
+            round(kinematics.poses_per_s(model), -4),
+            "1/s",
+            f"inverse kinematics and tendon lengths, arrays of {kinematics.POSES} poses, {load_1}",
+        )
+    for name, model in (("ik_single_us", "paper"), ("ik_single_taut_us", "taut")):
+        yield Figure(
+            name,
+            round(kinematics.single_us(model), 1),
+            "us",
+            f"the same for one pose, from Python, model {model}, {load_1}",
+        )
+
+
 FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     "paper_wall": paper_wall,
     "realtime_factor": realtime_factor,
     "frame_overhead": frame_overhead,
     "firmware_size": firmware_size,
     "random_obstacles": random_obstacles,
+    "kinematics_speed": kinematics_speed,
 }
 
 

@@ -83,7 +83,9 @@ def lengths(arc: Arc, geometry: Geometry, model: str = "paper") -> FloatArray:
     array([55.605, 59.377, 63.484, 59.377])
     """
     result = _find(model).lengths(arc, geometry)
-    if result.size and not result.min() > 0:
+    # For a single pose numpy's own minimum would take longer than the lengths.
+    least = min(result.tolist()) if result.ndim == 1 else result.min(initial=1.0)
+    if not least > 0:
         bad = ~(result > 0)
         raise InputError(
             f"The {model} length of tendon{first_place(bad)} would be {result[bad][0]:.3g} mm.",
