@@ -43,8 +43,16 @@ help: ## list the targets
 	@$(PIP) scikit-build-core cmake ninja
 	@touch $@
 
-# Editable: only C++ needs a second installation.
-.venv/.installed: .venv/.made pyproject.toml $(NATIVE_SOURCES)
+# An editable installation knows its modules by a list: it needs a new one when a
+# module comes or goes, not when one changes.
+LIST_MODULES := find host/setae protocol/setae_protocol -name '*.py' | LC_ALL=C sort
+.venv/.modules: .venv/.made FORCE
+	@$(LIST_MODULES) | cmp -s - $@ || $(LIST_MODULES) >$@
+
+.PHONY: FORCE
+FORCE:
+
+.venv/.installed: .venv/.made .venv/.modules pyproject.toml $(NATIVE_SOURCES)
 	@echo 'setae: compiling the simulator'
 	@$(PIP) --no-build-isolation --editable '.[report]'
 	@touch $@

@@ -1,4 +1,4 @@
-"""What all Python tests share: they refuse to run on a simulator older than its source."""
+"""What all Python tests share: they refuse to run on an installation older than its source."""
 
 from __future__ import annotations
 
@@ -20,13 +20,21 @@ def newer_than(stamp: Path) -> list[Path]:
     return [file for file in sources if file.stat().st_mtime > compiled_at]
 
 
+def gone(listing: Path) -> list[str]:
+    """Return the modules that the editable installation looks for in vain."""
+    return [name for name in listing.read_text().split() if not (ROOT / name).exists()]
+
+
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Stop before the first test if it would test yesterday's simulator."""
+    """Stop before the first test if it would test yesterday's code."""
     del session
     stamp = Path(sys.prefix) / ".installed"  # the Makefile's; other environments have none
-    if stamp.exists() and (changed := newer_than(stamp)):
-        pytest.exit(
-            f"{changed[0].relative_to(ROOT)} changed after the simulator was compiled: "
-            "run `make build` first",
-            returncode=1,
-        )
+    if not stamp.exists():
+        return
+    if changed := newer_than(stamp):
+        words = f"{changed[0].relative_to(ROOT)} changed after the simulator was compiled"
+    elif moved := gone(stamp.with_name(".modules")):
+        words = f"{moved[0]} has gone since the package was installed"
+    else:
+        return
+    pytest.exit(f"{words}: run `make build` first", returncode=1)
