@@ -10,14 +10,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from setae.cli import experiment, firmware, logs, robot
+from setae.cli import experiment, firmware, logs, robot, workspace
 from setae.cli.common import app
 from setae.errors import SetaeError
 
 __all__ = ["app", "main"]
 
 # Each adds its commands when it is imported.
-_COMMANDS = (robot, experiment, logs, firmware)
+_COMMANDS = (robot, experiment, logs, workspace, firmware)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

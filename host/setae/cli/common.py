@@ -15,7 +15,7 @@ from rich.console import Console
 
 import setae
 from setae.config import Config, load
-from setae.errors import InputError
+from setae.errors import InputError, SetaeError
 
 app = App(
     name="setae",
@@ -67,6 +67,27 @@ class Where:
     def load(self) -> Config:
         """The configuration."""
         return load(self.config)
+
+
+def new_folder(name: str, out: Path | None, *, force: bool) -> Path:
+    """The folder to write into, made if need be; by default the next free runs/NAME-N."""
+    try:
+        if out is None:
+            number = 1
+            while (folder := Path("runs") / f"{name}-{number}").exists():
+                number += 1
+            folder.mkdir(parents=True)
+            return folder
+        if out.is_dir() and any(out.iterdir()) and not force:
+            raise InputError(
+                f"{out} holds files already.", "Give another --out, or --force to write into it."
+            )
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SetaeError(
+            f"The folder {error.filename} can't be made: {error.strerror}.", "Give another --out."
+        ) from error
+    return out
 
 
 class Interrupts:

@@ -12,9 +12,9 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from setae import rig
-from setae.cli.common import Where, app, console, interrupts
+from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.config import Config
-from setae.errors import ExtraMissingError, InputError, SetaeError
+from setae.errors import ExtraMissingError, InputError
 from setae.experiments.explore import (
     PAPER_DESCENTS_MM,
     Event,
@@ -72,7 +72,7 @@ def explore(
     config = where.load()
     obstacles = _obstacles(config, obstacle, azimuth, trials)
     simulated = where.simulated
-    folder = _folder(out, force=force)
+    folder = new_folder("explore", out, force=force)
     progress = _Progress(len(obstacles))
     logs: list[Path] = []
 
@@ -166,27 +166,6 @@ def _obstacle(config: Config, text: str, azimuth_deg: float) -> Obstacle | None:
     return Obstacle(
         below_tip_mm=below_tip_mm, azimuth_deg=azimuth_deg, edge_mm=config.tube.cube_edge_mm
     )
-
-
-def _folder(out: Path | None, *, force: bool) -> Path:
-    """The folder to write into, made if need be."""
-    try:
-        if out is None:
-            number = 1
-            while (folder := Path("runs") / f"explore-{number}").exists():
-                number += 1
-            folder.mkdir(parents=True)
-            return folder
-        if out.is_dir() and any(out.iterdir()) and not force:
-            raise InputError(
-                f"{out} holds files already.", "Give another --out, or --force to write into it."
-            )
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SetaeError(
-            f"The folder {error.filename} can't be made: {error.strerror}.", "Give another --out."
-        ) from error
-    return out
 
 
 def _ask_to_place(what: Obstacle | None) -> None:
