@@ -3,7 +3,7 @@
     python docs/make_pictures.py [RUN_DIR]
 
 Without a folder it runs the paper's five trials in the simulator, seed 0. With
-one it draws the logs in it.
+one it draws the logs in it. The theory's pictures it draws in any case.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+import theory_pictures
 
 from setae.report import explore, pictures
 
@@ -27,6 +29,7 @@ def draw(run: Path) -> None:
 
 def main(arguments: list[str]) -> None:
     """Draw the given run, or one made for it."""
+    theory_pictures.draw(PICTURES)
     if arguments:
         draw(Path(arguments[0]))
         return
