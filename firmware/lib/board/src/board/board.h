@@ -108,7 +108,7 @@ class Board {
   SETAE_OWN_FRAME bool send_pong();
   SETAE_OWN_FRAME bool send_telemetry();
   template <typename Record>
-  SETAE_OWN_FRAME void send_latched(Latch<Record>& latch);
+  SETAE_OWN_FRAME bool send_latched(Latch<Record>& latch);
   protocol::BoardHeader header() const;
 
   Hal& hal_;

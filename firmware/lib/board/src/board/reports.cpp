@@ -7,29 +7,45 @@
 
 namespace setae {
 
+// Nothing overtakes what finds no room: small answers to a host that asks without a break would
+// keep the line from ever having room for a record.
 void Board::report() {
-  if (hello_wanted_ && send_hello_reply())
+  if (hello_wanted_) {
+    if (!send_hello_reply())
+      return;
     hello_wanted_ = false;
+  }
   if (receipt_wanted_) {
     const protocol::Receipt receipt = {gap_};
-    if (transmitter_.send(header(), receipt))
-      receipt_wanted_ = gap_ = false;
+    if (!transmitter_.send(header(), receipt))
+      return;
+    receipt_wanted_ = gap_ = false;
   }
-  if (pong_wanted_ && send_pong())
+  if (!send_latched(trip_) || !send_latched(fault_) || !send_latched(refusal_))
+    return;
+  if (pong_wanted_) {
+    if (!send_pong())
+      return;
     pong_wanted_ = false;
-  send_latched(trip_);
-  send_latched(fault_);
-  send_latched(refusal_);
-  if (telemetry_wanted_ && send_telemetry())
+  }
+  if (telemetry_wanted_) {
+    if (!send_telemetry())
+      return;
     telemetry_wanted_ = false;
+  }
   if (limits_wanted_ && send_limits())
     limits_wanted_ = false;
 }
 
+// False where it is wanted and the line has no room.
 template <typename Record>
-void Board::send_latched(Latch<Record>& latch) {
-  if (latch.wanted(session_.open()) && transmitter_.send(header(), latch.record()))
-    latch.sent();
+bool Board::send_latched(Latch<Record>& latch) {
+  if (!latch.wanted(session_.open()))
+    return true;
+  if (!transmitter_.send(header(), latch.record()))
+    return false;
+  latch.sent();
+  return true;
 }
 
 protocol::BoardHeader Board::header() const {
