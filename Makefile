@@ -81,7 +81,7 @@ flash: ## build the firmware and write it to the UNO (PORT=/dev/ttyACM0, or foun
 	$(PIO) run -e uno --target upload $(if $(PORT),--upload-port $(PORT))
 
 .PHONY: bench
-bench: .venv/.dev ## measure, into bench/results.json
+bench: .venv/.dev firmware $(AVR_LIBRARY) ## measure, into bench/results.json
 	$(BIN)/python bench/run.py
 
 .PHONY: docs
@@ -98,7 +98,7 @@ pictures: .venv/.installed ## run the exploration, and draw the documentation's 
 # In this order, so that what fails fastest comes first and pytest's count comes last.
 .PHONY: test
 test: ## check everything: style, types, drift, firmware, wheel, behaviour
-	@.ci/need --install python compiler
+	@.ci/need --install python compiler $(AVR_PACKAGES)
 	@$(PIO) --version # sets PlatformIO up: what that lacks is said first, not after minutes
 	@$(MAKE) --no-print-directory lint
 	@$(MAKE) --no-print-directory drift

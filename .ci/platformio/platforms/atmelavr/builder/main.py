@@ -1,4 +1,4 @@
-"""Link the firmware, convert it to hex, tell its size: what atmelavr does, without upload."""
+"""Link the firmware, convert it to hex, tell its size, upload it: what atmelavr does."""
 
 from SCons.Script import Builder, Default, DefaultEnvironment
 
@@ -24,3 +24,18 @@ to_hex = Builder(
 env.Append(BUILDERS={"ElfToHex": to_hex})
 firmware = env.ElfToHex("$BUILD_DIR/${PROGNAME}", env.BuildProgram())
 Default(env.Alias("buildprog", firmware))
+env.AddPlatformTarget(
+    "upload",
+    firmware,
+    [
+        env.VerboseAction(".ci/need avrdude", "Looking for avrdude"),
+        env.VerboseAction(env.AutodetectUploadPort, "Looking for the board"),
+        # The UNO's bootloader, as in the Arduino core's boards.txt.
+        env.VerboseAction(
+            'avrdude -q -p atmega328p -c arduino -b 115200 -D -P "$UPLOAD_PORT" '
+            "-U flash:w:$SOURCE:i",
+            "Uploading $SOURCE",
+        ),
+    ],
+    "Upload",
+)
