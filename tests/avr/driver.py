@@ -19,6 +19,7 @@ from tests.avr.simavr import (
 
 from setae.link.events import Event, FaultReported, TelemetryReceived, Ticket, Tripped
 from setae.link.session import Session
+from setae_protocol.frame import encode_host
 from setae_protocol.messages import (
     BAUD,
     BOARD_OVERHEAD_BYTES,
@@ -28,6 +29,8 @@ from setae_protocol.messages import (
     SERVOS,
     Enable,
     GuardMessage,
+    Ping,
+    ReadLimits,
     Reflex,
     Resume,
     Segment,
@@ -50,6 +53,8 @@ WIDE_LIMITS = SetLimits(
     coarse_threshold_raw=0,
     hold_timeout_s=0,
 )
+# So much is on a loaded line ahead of whatever the host sends.
+_BACKLOG_CYCLES = 8_000 * CYCLES_PER_US
 _BYTE_US = 10_000_000 // BAUD
 _UNUSED = Segment(duration_frames=0, target_ticks=(0, 0, 0, 0))
 # A pulse begins within this of its frame's start, which telemetry tells to better than 2 ms.
@@ -175,6 +180,14 @@ class Driver:
         self._edges += self.uno.edges()
         return pulses(self._edges)
 
+    def forget(self) -> None:
+        """Drop the edges and samples so far, to keep long runs fast."""
+        self._edges += self.uno.edges()
+        last = {edge.servo: edge for edge in self._edges}
+        self._edges = [edge for edge in last.values() if edge.level]  # their pulses still run
+        self.uno.samples()
+        self._samples.clear()
+
     def samples(self) -> list[Sample]:
         """All samples that the sensor took."""
         self._samples += self.uno.samples()
@@ -206,6 +219,35 @@ class Driver:
                 )
             )
         return frames
+
+
+class Load:
+    """Keeps the line full in both directions, while the session waits.
+
+    Questions for the limits fill the way back. The rest of the way there are
+    pings of another session: the board decodes them and drops them.
+    """
+
+    def __init__(self, driver: Driver) -> None:
+        self._uno = driver.uno
+        foreign = encode_host(Ping(token=0x01020304), session=driver.session_id + 1)
+        question = encode_host(ReadLimits(token=0), session=driver.session_id)
+        self._filler = question + 3 * foreign
+        driver.session.pollables.append(self)
+
+    def poll(self, now_us: int) -> None:
+        """Put more on the line."""
+        del now_us
+        while self._uno.line_free < self._uno.cycle + _BACKLOG_CYCLES:
+            self._uno.send(self._filler)
+
+
+def first_still(frames: Sequence[FramePulses]) -> FramePulses:
+    """Return the first frame of the still ones at the end: it repeats the frame before it."""
+    still = len(frames) - 1
+    while frames[still - 1].ticks == frames[-1].ticks:
+        still -= 1
+    return frames[still + 1]
 
 
 def ramp(start: Ticks, end: Ticks, count: int) -> list[Ticks]:

@@ -115,6 +115,8 @@ class Statistics:
 
 
 def _load() -> ctypes.CDLL:
+    if not LIBRARY.is_file():
+        raise RuntimeError(f"{LIBRARY} is missing: run `make avr`")
     library = ctypes.CDLL(str(LIBRARY))
     handle, cycle, size = ctypes.c_void_p, ctypes.c_uint64, ctypes.c_size_t
     signatures: dict[str, tuple[object, Sequence[object]]] = {
@@ -125,6 +127,7 @@ def _load() -> ctypes.CDLL:
         "uno_cycle": (cycle, [handle]),
         "uno_run": (None, [handle, cycle, ctypes.c_int]),
         "uno_send": (None, [handle, ctypes.c_char_p, size, cycle, ctypes.c_double]),
+        "uno_line_free": (cycle, [handle]),
         "uno_receive": (size, [handle, ctypes.c_char_p, size, ctypes.POINTER(cycle)]),
         "uno_edges": (size, [handle, ctypes.POINTER(_Edge), size]),
         "uno_samples": (size, [handle, ctypes.POINTER(_Sample), size]),
@@ -205,6 +208,11 @@ class Uno:
     def send(self, data: bytes, *, bit_cycles: float = _BIT_CYCLES) -> None:
         """Put bytes on the line to the board, behind those that are on it already."""
         self._library.uno_send(self._handle, data, len(data), self.cycle, bit_cycles)
+
+    @property
+    def line_free(self) -> int:
+        """The cycle at which all bytes sent to the board have passed."""
+        return int(self._library.uno_line_free(self._handle))
 
     def receive(self) -> tuple[bytes, int]:
         """Take what came from the board; and the cycle at which the last byte had passed."""

@@ -6,8 +6,8 @@ import random
 from itertools import pairwise
 
 import pytest
-from tests.avr.driver import Driver, Ticks, ramp
-from tests.avr.simavr import CYCLES_PER_TICK, FRAME_CYCLES, by_servo
+from tests.avr.driver import Driver, Ticks, first_still, ramp
+from tests.avr.simavr import CYCLES_PER_TICK, CYCLES_PER_US, FRAME_CYCLES, by_servo
 
 from setae_protocol.messages import (
     ATTACH_INTERVAL_FRAMES,
@@ -105,10 +105,9 @@ def test_a_stop_freezes_whole_pulses(driver: Driver, phase_us: int) -> None:
     _assert_every_pulse_is_as_told(driver)
     frames = driver.frames()
     frozen = frames[-1].ticks
-    first = next(frame for frame in frames if frame.ticks == frozen)
     assert frozen != tuple(map(float, HIGH))
-    # The stop's 0.5 ms on the line, and the frame that is on its way already.
-    assert first.first_rise - sent < 1.1 * FRAME_CYCLES
+    # The stop's 0.4 ms on the line, and the frame that has begun already.
+    assert first_still(frames).first_rise - sent < FRAME_CYCLES + 1_000 * CYCLES_PER_US
 
 
 @pytest.mark.parametrize("phase_us", [0, 3_000, 6_500, 9_100, 13_000, 16_900, 19_950])

@@ -68,10 +68,14 @@ void uno_run(Uno* uno, uint64_t end, int stop_after_frame) {
   uno->run(end, stop_after_frame != 0);
 }
 
-// Returns the cycle at which the last byte's stop bit has passed.
 void uno_send(Uno* uno, const uint8_t* data, size_t size, uint64_t earliest, double bit_cycles) {
   for (size_t i = 0; i < size; ++i)
     uno->usart().send(data[i], earliest, bit_cycles);
+}
+
+// When the last byte sent to the board has passed.
+uint64_t uno_line_free(Uno* uno) {
+  return uno->usart().line_free();
 }
 
 // Returns how many; `end` is when the last of them had passed.

@@ -23,7 +23,7 @@ constexpr uint8_t kSoftwareReset = 1 << 2;
 constexpr uint8_t kAutoIncrement = 1 << 4;
 constexpr uint8_t kBoot = 1 << 7;
 
-// Section 9.4, table 17: output data rates by bits 6:4 of CTRL_REG1.
+// Section 9, CTRL_REG1: output data rates by bits 6:4.
 constexpr double kRatesHz[8] = {0, 1, 10, 25, 50, 75, 0, 0};
 
 bool writable(uint8_t reg) {
@@ -120,7 +120,7 @@ void Lps33hw::sample(Cycle when) {
   if (silent_)
     return;
   samples_.push_back({when, raw_});
-  if (locked_) {  // section 9.4: not updated until both parts have been read
+  if (locked_) {  // BDU: not updated until both parts have been read
     held_back_ = true;
     held_raw_ = raw_;
   } else {

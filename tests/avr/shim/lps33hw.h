@@ -1,5 +1,5 @@
 // The pressure sensor as an I2C slave: its register file, and samples at its rate. Data sheet of
-// the LPS33HW, sections 7 and 9.
+// the LPS33HW, section 9.
 #pragma once
 
 #include <stdint.h>

@@ -25,7 +25,7 @@ const Timer::Kind Timer::kTimer1 = {1,
                                     0x8A,
                                     0x36,
                                     0x6F,
-                                    // Table 16-5; 6 and 7 are an external clock.
+                                    // Section 16.11, TCCR1B; 6 and 7 are an external clock.
                                     {0xFF, 0, 3, 6, 8, 10, 0xFF, 0xFF},
                                     1 << 0};
 const Timer::Kind Timer::kTimer2 = {2,
@@ -38,7 +38,7 @@ const Timer::Kind Timer::kTimer2 = {2,
                                     0xB4,
                                     0x37,
                                     0x70,
-                                    // Table 18-9.
+                                    // Section 18.11, TCCR2B.
                                     {0xFF, 0, 3, 5, 6, 7, 8, 10},
                                     1 << 1};
 
@@ -138,7 +138,7 @@ void Timer::rebase(Cycle when, uint32_t count) {
   base_tick_ = shift_ == kStopped ? 0 : tick(when);
 }
 
-// Figure 16-11: flag and output change at the timer clock that takes the counter past the match.
+// Section 16.10: flag and output change at the timer clock that takes the counter past the match.
 void Timer::schedule(int unit, bool skip_present) {
   Compare& compare = units_[unit];
   if (!running()) {
@@ -171,7 +171,7 @@ bool Timer::connected(Unit unit) const {
   return mode_of_output(static_cast<int>(unit)) != 0;
 }
 
-// Table 16-2: toggle, clear, set.
+// Section 16.11, TCCR1A: toggle, clear, set.
 void Timer::act(int unit, Cycle when) {
   bool& latch = units_[unit].latch;
   switch (mode_of_output(unit)) {
@@ -218,7 +218,7 @@ void Timer::on_control(uint16_t address, uint8_t value) {
     on_output_(now);
 }
 
-// Section 17.4.3: while TSM is set the prescaler stays at 0; without it the bit resets it once.
+// Section 17.4.1: while TSM is set the prescaler stays at 0; without it the bit resets it once.
 void Timer::hold(uint8_t gtccr) {
   const Cycle now = chip_.cycle();
   const uint32_t reached = count(now);

@@ -20,7 +20,7 @@ constexpr uint8_t kTwwc = 1 << 3;
 constexpr uint8_t kTwen = 1 << 2;
 constexpr uint8_t kTwie = 1 << 0;
 
-// Tables 22-2 and 22-3.
+// Section 22.7, master modes.
 constexpr uint8_t kStarted = 0x08;
 constexpr uint8_t kStartedAgain = 0x10;
 constexpr uint8_t kWriteAck = 0x18;

@@ -24,7 +24,7 @@ constexpr uint8_t kTransmitEnable = 1 << 3;
 constexpr uint8_t kUcsrAWritable = 0x03;
 
 constexpr int kFrameBits = 10;
-// The stop bit is decided at its tenth of sixteen samples (figure 20-6).
+// The stop bit is decided at its tenth of sixteen samples (section 20.8).
 constexpr double kStopSampleBits = 9.625;
 
 }  // namespace

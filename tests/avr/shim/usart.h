@@ -22,6 +22,9 @@ class Usart {
   // Puts a byte on the line to the board as soon as that is free, not before `earliest`.
   void send(uint8_t value, Cycle earliest, double bit_cycles);
 
+  // When the line to the board is free again.
+  Cycle line_free() const { return static_cast<Cycle>(line_free_ + 0.5); }
+
   std::deque<LineByte>& sent_by_board() { return sent_; }
   uint32_t overruns() const { return overruns_; }
   uint32_t frame_errors() const { return frame_errors_; }
