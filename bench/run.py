@@ -273,6 +273,20 @@ def kinematics_speed() -> Iterable[Figure]:
         )
 
 
+FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
+    "paper_wall": paper_wall,
+    "realtime_factor": realtime_factor,
+    "frame_overhead": frame_overhead,
+    "firmware_size": firmware_size,
+    "uno_loaded": uno_loaded,
+    "uno_contacts": uno_contacts,
+    "uno_stops": uno_stops,
+    "uno_query": uno_query,
+    "random_obstacles": random_obstacles,
+    "kinematics_speed": kinematics_speed,
+}
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__)
