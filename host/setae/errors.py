@@ -298,7 +298,10 @@ class PoseUnknownError(SetaeError):
     The jump can release up to 50 mm of tendon at full speed.
     """
 
-    default_remedy = "Let the spring relax, keep clear, then call enable(accept_jump=True)."
+    default_remedy = (
+        "Let the spring relax, keep clear, then give --accept-jump, or call "
+        "enable(accept_jump=True)."
+    )
 
 
 class DeadlineError(SetaeError, TimeoutError):

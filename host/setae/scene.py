@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 
 from setae.config import Config
-from setae.errors import InputError
+from setae.errors import ConfigError, InputError
 
 Point = tuple[float, float, float]
 
@@ -37,8 +37,8 @@ class Obstacle:
     Raises
     ------
     InputError
-        A value is not finite, the edge is not positive, or the cube would reach
-        the start pose.
+        A value is not finite or no angle, the edge is not positive, or the cube
+        would reach the start pose.
 
     Examples
     --------
@@ -55,6 +55,10 @@ class Obstacle:
             value = getattr(self, name)
             if not math.isfinite(value):
                 raise InputError(f"obstacle: {name} is {value}.", "Give a finite number.")
+        if abs(self.azimuth_deg) > 360:
+            raise InputError(
+                f"obstacle: azimuth_deg is {self.azimuth_deg:g}.", "Give an angle from -360 to 360."
+            )
         if self.below_tip_mm <= 0:
             raise InputError(
                 f"obstacle: {self.below_tip_mm:g} mm below the tip would be beside the robot "
@@ -111,6 +115,8 @@ def tube_scene(config: Config, obstacle: Obstacle | None = None) -> Scene:
 
     Raises
     ------
+    ConfigError
+        The robot would hang in the tube's wall.
     InputError
         The cube would fill the robot's own path.
 
@@ -122,12 +128,18 @@ def tube_scene(config: Config, obstacle: Obstacle | None = None) -> Scene:
     (50.0, 0.0, -165.0)
     """
     tube = config.tube
+    wall_mm = tube.inner_radius_mm - tube.axis_offset_mm
+    if wall_mm <= config.geometry.spring_outer_diameter_mm / 2:
+        raise ConfigError(
+            f"The tube's wall would be {wall_mm:g} mm from the robot's axis, and the spring is "
+            f"{config.geometry.spring_outer_diameter_mm:g} mm thick.",
+            "Give [tube] a larger inner_radius_mm, or a smaller axis_offset_mm.",
+        )
     azimuth_rad = math.radians(obstacle.azimuth_deg if obstacle else 0.0)
     # Frame D's y is the world's -y.
     towards = (math.cos(azimuth_rad), -math.sin(azimuth_rad))
     box = None
     if obstacle is not None:
-        wall_mm = tube.inner_radius_mm - tube.axis_offset_mm
         inner_face_mm = wall_mm - obstacle.edge_mm
         if inner_face_mm <= 0:
             raise InputError(

@@ -7,8 +7,10 @@ the stage together with the robot, so each is watched while the other moves.
 
 from __future__ import annotations
 
+import contextlib
 import select
 import sys
+import termios
 from collections.abc import Callable, Sequence
 from typing import IO, Protocol, runtime_checkable
 
@@ -61,6 +63,44 @@ class Stage(Protocol):
         ...
 
 
+class Enter:
+    """The Enter key of a person who was asked for something; never waited for.
+
+    Parameters
+    ----------
+    answers
+        Where Enter is read from: an open text file that `select` can watch. None:
+        the terminal.
+    """
+
+    def __init__(self, answers: IO[str] | None = None) -> None:
+        self._answers = answers if answers is not None else sys.stdin
+
+    def forget(self) -> None:
+        """Drop what was typed before the question: it can't be the answer."""
+        with contextlib.suppress(AttributeError, OSError, ValueError, termios.error):
+            termios.tcflush(self._answers.fileno(), termios.TCIFLUSH)
+
+    def pressed(self) -> bool:
+        """Whether Enter was pressed since the last one.
+
+        Raises
+        ------
+        StageError
+            There is nobody to press it: the input ended, or there is none.
+        """
+        try:
+            readable, _, _ = select.select([self._answers], [], [], 0)
+            if not readable:
+                return False
+            line = self._answers.readline()
+        except (AttributeError, OSError, TypeError, ValueError):  # closed, or never opened
+            line = ""
+        if not line:
+            raise StageError("Nobody can press Enter: the input ended.", "Run it in a terminal.")
+        return True
+
+
 class ManualStage:
     """A stage that a person moves, with the arm's own pendant or by hand.
 
@@ -80,7 +120,7 @@ class ManualStage:
         self, *, ask: Callable[[str], object] = print, answers: IO[str] | None = None
     ) -> None:
         self._ask = ask
-        self._answers = answers if answers is not None else sys.stdin
+        self._enter = Enter(answers)
         self._position_mm = (0.0, 0.0, 0.0)
         self._target_mm: tuple[float, float, float] | None = None
 
@@ -105,6 +145,7 @@ class ManualStage:
         del speed_mm_s, acceleration_mm_s2
         x_mm, y_mm, z_mm = (float(value) for value in position_mm)
         self._target_mm = (x_mm, y_mm, z_mm)
+        self._enter.forget()
         self._ask(
             f"Move the arm to x {x_mm:g}, y {y_mm:g}, z {z_mm:g} mm from its start, slowly,"
             " then press Enter."
@@ -119,13 +160,5 @@ class ManualStage:
     def poll(self, now_us: int) -> None:
         """Look whether Enter was pressed; never waits."""
         del now_us
-        if self._target_mm is None:
-            return
-        readable, _, _ = select.select([self._answers], [], [], 0)
-        if not readable:
-            return
-        if not self._answers.readline():
-            raise StageError(
-                "Nobody can confirm the arm's move: the input ended.", "Run it in a terminal."
-            )
-        self._position_mm, self._target_mm = self._target_mm, None
+        if self._target_mm is not None and self._enter.pressed():
+            self._position_mm, self._target_mm = self._target_mm, None

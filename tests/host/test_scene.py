@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from setae.config import load
-from setae.errors import InputError
+from setae.config import load, loads
+from setae.errors import ConfigError, InputError
 from setae.scene import Obstacle, tube_scene
 
 
@@ -51,3 +51,9 @@ def test_obstacles_that_can_not_be_are_refused(values: dict[str, float]) -> None
 def test_a_cube_that_fills_the_robots_own_way_is_refused() -> None:
     with pytest.raises(InputError, match="axis"):
         tube_scene(load(), Obstacle(below_tip_mm=35.0, edge_mm=70.0))
+
+
+def test_a_tube_that_the_robot_does_not_fit_into_is_refused() -> None:
+    """It hung inside of the wall, and reported an empty tube."""
+    with pytest.raises(ConfigError, match="wall"):
+        tube_scene(loads("[tube]\ninner_radius_mm = 110.0\n"))

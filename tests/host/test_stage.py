@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pty
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import IO
@@ -10,7 +11,7 @@ from typing import IO
 import pytest
 
 from setae.errors import StageError
-from setae.stage import ManualStage, Stage
+from setae.stage import Enter, ManualStage, Stage
 
 TARGET_MM = (0.0, 0.0, -20.0)
 
@@ -62,3 +63,24 @@ def test_without_anybody_to_confirm_it_fails_instead_of_waiting(person: Person) 
     person.keyboard.close()
     with pytest.raises(StageError, match="terminal"):
         person.stage.poll(0)
+
+
+def test_enter_typed_before_the_question_is_no_answer() -> None:
+    """One Enter too many, during a scan, confirmed the arm's next move unseen."""
+    keyboard, terminal = pty.openpty()
+    with os.fdopen(keyboard, "wb", buffering=0) as keys, os.fdopen(terminal) as answers:
+        stage = ManualStage(ask=lambda _: None, answers=answers)
+        keys.write(b"\n")
+        stage.move_to(TARGET_MM)
+        stage.poll(0)
+        assert stage.moving
+        keys.write(b"\n")
+        stage.poll(1)
+        assert not stage.moving
+
+
+def test_no_input_at_all_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program started without stdin gave a TypeError."""
+    monkeypatch.setattr("sys.stdin", None)
+    with pytest.raises(StageError, match="Nobody"):
+        Enter().pressed()

@@ -72,3 +72,63 @@ def test_commands_for_one_robot(
     arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert words in output_of(capsys, *arguments, "--sim")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a short run, without a report."""
+    folder = tmp_path_factory.mktemp("run")
+    config = folder / "short.toml"
+    config.write_text("[explore]\nsteps = 1\ndirections = 1\n")
+    with pytest.raises(SystemExit) as ended:
+        main(["explore", "--sim", "--obstacle", "none", "--obstacle", "5", "--no-report",
+              "--config", str(config), "--out", str(folder / "logs")])  # fmt: skip
+    assert ended.value.code == 0
+    return folder / "logs"
+
+
+def test_a_folder_is_reported_as_a_run(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Only single logs were taken, and a folder for --out was told to be a wrong file."""
+    printed = output_of(capsys, "report", str(run), "--out", str(tmp_path))
+    assert str(tmp_path / "report.html") in printed.replace("\n", "")
+    rows = (tmp_path / "trials.csv").read_text().splitlines()
+    assert len(rows) == 3
+
+
+def test_what_a_damaged_log_lacks_is_told_beside_the_report(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`report` used to say nothing of it in the terminal."""
+    data = (run / "trial-1.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(data[: len(data) * 3 // 4])
+    for command in ("report", "replay"):
+        with pytest.raises(SystemExit) as ended:
+            main([command, str(cut)])
+        assert ended.value.code == 0
+        error = capsys.readouterr().err.splitlines()
+        assert len(error) == 1
+        assert "cut.mcap is not whole" in error[0]
+        assert "could not be read" in error[0]
+
+
+def test_ctrl_c_while_the_report_is_written_says_how_to_get_it_later(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("setae.report.write", interrupted)
+    config = tmp_path / "short.toml"
+    config.write_text("[explore]\nsteps = 1\ndirections = 1\n")
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit) as ended:
+        main(["explore", "--sim", "--obstacle", "none", "--config", str(config),
+              "--out", str(out)])  # fmt: skip
+    assert ended.value.code == 130
+    error = capsys.readouterr().err
+    assert "the experiment is done" in error
+    assert f"setae report {out}" in error
+    assert record.read(out / "trial-1.mcap").damage is None

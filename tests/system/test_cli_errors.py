@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import select
+import subprocess
+import sys
 import threading
 import tty
 from collections.abc import Callable, Iterator
@@ -203,6 +205,8 @@ def test_a_configuration_that_is_not_there(capsys: pytest.CaptureFixture[str]) -
         (("--obstacle", "deep"), "deep"),
         (("--obstacle", "-5"), "above 0 mm"),
         (("--obstacle", "nan"), "finite"),
+        (("--obstacle", "550"), "107 mm"),  # it ran, and touched nothing
+        (("--obstacle", "35", "--azimuth", "1e300"), "-360 to 360"),
         (("--obstacle", "35", "--trials", "paper"), "--trials"),
         (("--port", "/dev/ttyACM0"), "--port"),
         (("--seed", "-1"), "--seed"),
@@ -246,10 +250,59 @@ def test_flashing_without_sources_or_tools_says_what_is_missing(
     assert "other.hex" in error_of(capsys, "flash", "--hex-file", "other.hex")
 
 
-def test_an_unknown_option_is_an_error_too(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["explore", "--no-such-option"])
-    assert ended.value.code not in (0, None)
-    captured = capsys.readouterr()
-    assert "no-such-option" in captured.out + captured.err
-    assert "Traceback" not in captured.out + captured.err
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("explore", "--no-such-option"), "no-such-option"),
+        (("explor",), "explore"),
+        (("info", "--seed", "seven"), "seven"),
+        (("report",), "log"),
+        (("move", "1", "2", "three", "--sim"), "three"),
+    ],
+)
+def test_what_no_command_takes_is_told_in_one_line_too(
+    arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """These came as boxes of several lines."""
+    assert words in error_of(capsys, *arguments)
+
+
+def test_exploring_without_a_board_asks_nobody_for_anything(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The obstacle used to be asked for first, and the board looked for only then."""
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    monkeypatch.chdir(tmp_path)
+    assert "--sim" in error_of(capsys, "explore")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scan_that_the_robot_can_not_reach_is_told_before_anything_moves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The arm used to go down first."""
+    config = tmp_path / "wide.toml"
+    config.write_text("[explore]\ntarget_radius_mm = 500.0\n")
+    out = tmp_path / "out"
+    error = error_of(capsys, "explore", "--sim", "--config", str(config), "--out", str(out))
+    assert "bent by" in error
+    assert not out.exists()
+
+
+def test_an_output_that_takes_nothing_is_no_bug_of_setae() -> None:
+    """A full disk behind `>` gave a traceback."""
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run(
+            [sys.executable, "-m", "setae.cli", "info", "--sim"],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines() == [
+        "setae: The output can't be written: No space left on device. Give it another place."
+    ]
+
+
+def test_a_report_of_a_folder_without_logs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "holds no log" in error_of(capsys, "report", str(tmp_path))

@@ -7,8 +7,11 @@ bug, and keeps it.
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Sequence
+
+from cyclopts import CycloptsError
 
 from setae.cli import experiment, firmware, logs, robot, workspace
 from setae.cli.common import app
@@ -23,16 +26,28 @@ _COMMANDS = (robot, experiment, logs, workspace, firmware)
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run `setae` and exit with its code.
 
-    0: done. 1: an error, told in one line. 130: ended by Ctrl-C.
+    0: done. 1: an error, told in one line. 2: no such command or option, or a value
+    of the wrong kind. 130: ended by Ctrl-C.
     """
     try:
-        code = app(arguments)
+        code = app(arguments, exit_on_error=False, print_error=False)
     except SetaeError as error:
-        text = " ".join([str(error), *getattr(error, "__notes__", [])])
-        print(f"setae: {' '.join(text.split())}", file=sys.stderr)
+        _tell(" ".join([str(error), *getattr(error, "__notes__", [])]))
+        sys.exit(1)
+    except CycloptsError as error:
+        _tell(f"{error} Give --help to see what there is.")
+        sys.exit(2)
+    except OSError as error:
+        # What setae reads and writes has errors of its own; this is what it prints.
+        if error.errno not in (errno.ENOSPC, errno.EIO, errno.EPIPE):
+            raise
+        _tell(f"The output can't be written: {error.strerror}. Give it another place.")
         sys.exit(1)
     except KeyboardInterrupt as interrupt:
-        notes = getattr(interrupt, "__notes__", None) or ["interrupted"]
-        print(f"setae: {' '.join(notes)}", file=sys.stderr)
+        _tell(" ".join(getattr(interrupt, "__notes__", None) or ["interrupted"]))
         sys.exit(130)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _tell(text: str) -> None:
+    print(f"setae: {' '.join(text.split())}", file=sys.stderr)

@@ -73,11 +73,7 @@ def new_folder(name: str, out: Path | None, *, force: bool) -> Path:
     """The folder to write into, made if need be; by default the next free runs/NAME-N."""
     try:
         if out is None:
-            number = 1
-            while (folder := Path("runs") / f"{name}-{number}").exists():
-                number += 1
-            folder.mkdir(parents=True)
-            return folder
+            return _next_free(name)
         if out.is_dir() and any(out.iterdir()) and not force:
             raise InputError(
                 f"{out} holds files already.", "Give another --out, or --force to write into it."
@@ -88,6 +84,18 @@ def new_folder(name: str, out: Path | None, *, force: bool) -> Path:
             f"The folder {error.filename} can't be made: {error.strerror}.", "Give another --out."
         ) from error
     return out
+
+
+def _next_free(name: str) -> Path:
+    number = 1
+    while True:
+        folder = Path("runs") / f"{name}-{number}"
+        try:
+            folder.mkdir(parents=True)  # not looked for first: two runs may start at once
+        except FileExistsError:
+            number += 1
+        else:
+            return folder
 
 
 class Interrupts:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,17 +15,20 @@ from rich.table import Table
 from setae import rig
 from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.config import Config
-from setae.errors import ExtraMissingError, InputError
+from setae.errors import ExtraMissingError, InputError, SetaeError
 from setae.experiments.explore import (
     PAPER_DESCENTS_MM,
     Event,
     ExploreResult,
     OnEvent,
     paper_obstacles,
+    reach_below_tip_mm,
     run_trials,
+    targets_mm,
 )
+from setae.robot import Robot
 from setae.scene import Obstacle, tube_scene
-from setae.stage import ManualStage
+from setae.stage import Enter, ManualStage
 
 Flag = Annotated[bool, Parameter(negative="")]
 
@@ -72,20 +76,17 @@ def explore(
     config = where.load()
     obstacles = _obstacles(config, obstacle, azimuth, trials)
     simulated = where.simulated
-    folder = new_folder("explore", out, force=force)
+    targets_mm(config)  # what the robot can't reach is told before anything begins
     progress = _Progress(len(obstacles))
     logs: list[Path] = []
+
+    @cache
+    def folder() -> Path:
+        return new_folder("explore", out, force=force)
 
     @contextmanager
     def setup(number: int, what: Obstacle | None) -> Iterator[tuple[rig.Rig, OnEvent]]:
         progress.trial(number, what)
-        log = folder / f"trial-{number}.mcap"
-        if force:
-            log.unlink(missing_ok=True)
-        stage = None
-        if not simulated:
-            stage = ManualStage(ask=console.print)
-            _ask_to_place(what)
         with (
             interrupts.caught(),
             rig.open(
@@ -93,10 +94,16 @@ def explore(
                 config=config,
                 seed=where.seed + number - 1,
                 scene=tube_scene(config, what),
-                stage=stage,
+                stage=None if simulated else ManualStage(ask=_say),
                 pollables=[interrupts],
             ) as opened,
         ):
+            # Only now, so that a board that isn't there costs neither work nor a folder.
+            log = folder() / f"trial-{number}.mcap"
+            if force:
+                log.unlink(missing_ok=True)
+            if not simulated:
+                _ask_to_place(opened.robot, what)
             recorder = opened.record(log, metadata={"experiment": "explore", "trial": number})
             logs.append(log)
             opened.robot.enable(accept_jump=accept_jump)
@@ -115,19 +122,41 @@ def explore(
         failures = getattr(interrupt, "__notes__", [])
         interrupt.__notes__ = [
             *(["interrupted, but:", *failures] if failures else _STOPPED),
-            *(f"The log {log} is closed and readable." for log in logs[-1:]),
+            *_what_is_left(logs),
         ]
         raise
+    except SetaeError as error:
+        for line in _what_is_left(logs):
+            error.add_note(line)
+        raise
     _print_table(results, paper=list(obstacles) == list(paper_obstacles(config)))
-    console.print(f"Logs: {folder}", markup=False, soft_wrap=True)
+    console.print(f"Logs: {folder()}", markup=False, soft_wrap=True)
     if report:
-        _report(logs, folder)
+        try:
+            _report(logs, folder())
+        except KeyboardInterrupt as interrupt:
+            interrupt.add_note(f"interrupted: the experiment is done. {_later(folder())}")
+            raise
 
 
 _STOPPED = ["interrupted: robot and arm are stopped."]
 
+
+def _what_is_left(logs: Sequence[Path]) -> list[str]:
+    """What a run that ended early leaves, and what can be done with it."""
+    if not logs:
+        return []
+    return [f"What happened is in {logs[-1]}. {_later(logs[-1].parent)}"]
+
+
+def _later(folder: Path) -> str:
+    return f"`setae report {folder}` makes a report of it."
+
+
 # A person jogs the arm by hand between two steps.
 _MANUAL_TIMEOUT_S = 600.0
+# Taking the tube apart to fix a cube in it takes longer.
+_PLACE_TIMEOUT_S = 3600.0
 
 
 def _report(logs: Sequence[Path], folder: Path) -> None:
@@ -137,7 +166,8 @@ def _report(logs: Sequence[Path], folder: Path) -> None:
         path = report.write(logs, folder / "report.html")
     except ExtraMissingError as error:
         # The experiment itself is done, and `setae report` can follow.
-        console.print(f"No report: {error}", style="yellow", markup=False, soft_wrap=True)
+        text = f"No report: {error} {_later(folder)}"
+        console.print(text, style="yellow", markup=False, soft_wrap=True)
         return
     console.print(f"Report: {path}", markup=False, soft_wrap=True)
 
@@ -163,19 +193,34 @@ def _obstacle(config: Config, text: str, azimuth_deg: float) -> Obstacle | None:
             f"--obstacle {text!r} is neither a height in mm nor none.",
             "Give for example --obstacle 55.",
         ) from None
-    return Obstacle(
+    obstacle = Obstacle(
         below_tip_mm=below_tip_mm, azimuth_deg=azimuth_deg, edge_mm=config.tube.cube_edge_mm
     )
+    reach_mm = reach_below_tip_mm(config)
+    if below_tip_mm > reach_mm:
+        raise InputError(
+            f"--obstacle {text} lies deeper than the bristle gets, which is {reach_mm:.0f} mm.",
+            "Give a smaller height, or none for an empty tube.",
+        )
+    return obstacle
 
 
-def _ask_to_place(what: Obstacle | None) -> None:
+def _ask_to_place(robot: Robot, what: Obstacle | None) -> None:
     where = (
         "Take every obstacle out of the tube"
         if what is None
         else f"Fix the cube {what.below_tip_mm:g} mm below the compressed tip"
         f" at α = {what.azimuth_deg:g}°"
     )
-    console.input(f"{where} and bring the arm to its start, then press Enter. ")
+    enter = Enter()
+    enter.forget()
+    _say(f"{where} and bring the arm to its start, then press Enter.")
+    # In the robot's own loop: it is watched meanwhile, and Ctrl-C is heard.
+    robot.wait(enter.pressed, timeout_s=_PLACE_TIMEOUT_S, what="the arm to be at its start")
+
+
+def _say(text: str) -> None:
+    console.print(text, markup=False, soft_wrap=True)
 
 
 class _Progress:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from setae import record
 from setae.cli.common import app, console
-from setae.errors import InputError
+from setae.errors import InputError, LogError
 
 
 @app.command
@@ -16,16 +17,37 @@ def report(log: Path, *more: Path, out: Path | None = None) -> None:
     Parameters
     ----------
     log
-        A log.
+        A log, or the folder of a run with all its logs.
     more
         Further logs for the same page.
     out
-        The page's file; the default is report.html beside the first log.
+        The page's file, or a folder for it; the default is report.html beside the
+        first log. Pictures and tables go beside the page.
     """
     from setae import report as pages
 
-    path = pages.write([log, *more], out or log.with_name("report.html"))
+    logs = [record.read(path) for given in (log, *more) for path in _logs_of(given)]
+    page = out or (log if log.is_dir() else log.parent)
+    if page.is_dir():
+        page = page / "report.html"
+    path = pages.write(logs, page)
+    for read in logs:
+        _warn_of_damage(read)
     console.print(f"Report: {path}", markup=False, soft_wrap=True)
+
+
+def _logs_of(given: Path) -> list[Path]:
+    """The log itself, or the logs in a folder."""
+    if not given.is_dir():
+        return [given]
+    if logs := sorted(given.glob("*.mcap")):
+        return logs
+    raise LogError(f"{given} holds no log.", "Give the folder that `setae explore` wrote.")
+
+
+def _warn_of_damage(log: record.Log) -> None:
+    if log.damage is not None:
+        print(f"setae: {log.path} is not whole. {log.damage}.", file=sys.stderr)
 
 
 @app.command
@@ -52,5 +74,4 @@ def replay(log: Path, *, topic: str | None = None) -> None:
         fields = {key: value for key, value in message.items() if key != "time_us"}
         text = " ".join(f"{key}={value}" for key, value in fields.items())
         console.print(f"{time_us / 1e6:10.3f} s  {name:<12} {text}", markup=False, soft_wrap=True)
-    if read.damage is not None:
-        console.print(f"Damaged: {read.damage}", style="yellow", markup=False, soft_wrap=True)
+    _warn_of_damage(read)

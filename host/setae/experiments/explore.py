@@ -22,6 +22,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from setae import kinematics, workspace
 from setae.config import Config
 from setae.errors import SetaeError
 from setae.robot import Contact, Robot
@@ -173,6 +174,51 @@ def scan_directions_deg(count: int) -> tuple[float, ...]:
     return tuple(360.0 * index / count for index in range(count))
 
 
+def targets_mm(config: Config) -> tuple[Point, ...]:
+    """Where one scan extends to in frame D, in its order.
+
+    Raises
+    ------
+    UnreachableError
+        The robot can't reach a target, or its compressed pose.
+
+    Examples
+    --------
+    >>> from setae.config import load
+    >>> targets_mm(load())[0]
+    (15.0, 0.0, 60.0)
+    """
+    settings = config.explore
+    targets = []
+    for alpha_deg in scan_directions_deg(settings.directions):
+        alpha_rad = math.radians(alpha_deg)
+        targets.append(
+            (
+                settings.target_radius_mm * math.cos(alpha_rad),
+                settings.target_radius_mm * math.sin(alpha_rad),
+                settings.target_height_mm,
+            )
+        )
+    for point in ((0.0, 0.0, settings.compressed_length_mm), *targets):
+        workspace.require(kinematics.inverse(point), config)
+    return tuple(targets)
+
+
+def reach_below_tip_mm(config: Config) -> float:
+    """How far below the compressed tip, at the arm's start, the last scan's tip gets.
+
+    Examples
+    --------
+    >>> from setae.config import load
+    >>> round(reach_below_tip_mm(load()))
+    107
+    """
+    settings, tip_offset_mm = config.explore, config.geometry.tip_offset_mm
+    tips = kinematics.position(kinematics.inverse(targets_mm(config)), tip_offset_mm=tip_offset_mm)
+    start_mm = settings.compressed_length_mm + tip_offset_mm
+    return settings.steps * settings.step_mm + float(tips[:, 2].max()) - start_mm
+
+
 def explore(
     robot: Robot,
     stage: Stage,
@@ -206,6 +252,8 @@ def explore(
 
     Raises
     ------
+    UnreachableError
+        The robot can't reach a target of the scan; nothing has moved.
     SetaeError
         Whatever ended the trial; the arm stays where it stopped.
     """
@@ -224,6 +272,7 @@ class _Trial:
         self._robot = robot
         self._stage = stage
         self._settings = robot.config.explore
+        self._targets_mm = targets_mm(robot.config)
         self._obstacle = obstacle
         self._on_event = on_event
         self._fixed_arm_timeout_s = arm_timeout_s
@@ -298,23 +347,18 @@ class _Trial:
 
     def _scan(self) -> None:
         self._emit("level_start", level=self._level, descent_mm=self._descent_mm())
-        for alpha_deg in scan_directions_deg(self._settings.directions):
+        directions_deg = scan_directions_deg(self._settings.directions)
+        for alpha_deg, target_mm in zip(directions_deg, self._targets_mm, strict=True):
             self._compress()
-            self._probe(alpha_deg)
+            self._probe(alpha_deg, target_mm)
         self._compress()
         touched = [touch.alpha_deg for touch in self._contacts]
         self._emit(
             "level_end", level=self._level, descent_mm=self._descent_mm(), touched_deg=touched
         )
 
-    def _probe(self, alpha_deg: float) -> None:
+    def _probe(self, alpha_deg: float, target_mm: Point) -> None:
         settings = self._settings
-        alpha_rad = math.radians(alpha_deg)
-        target_mm = (
-            settings.target_radius_mm * math.cos(alpha_rad),
-            settings.target_radius_mm * math.sin(alpha_rad),
-            settings.target_height_mm,
-        )
         self._emit("direction_start", alpha_deg=alpha_deg, target_mm=list(target_mm))
         contact = self._robot.probe(
             target_mm,
