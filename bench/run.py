@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # The oracle that judges explorations is the tests' own.
 sys.path.insert(0, str(ROOT))
 
-from bench import avr, elf, kinematics  # noqa: E402  # needs the path above
+from bench import avr, elf, kinematics, motion  # noqa: E402  # needs the path above
 from tests.system import oracle  # noqa: E402
 
 from setae import rig  # noqa: E402
@@ -273,6 +273,29 @@ def kinematics_speed() -> Iterable[Figure]:
         )
 
 
+def motion_segments() -> Iterable[Figure]:
+    """How few segments the board gets for a motion."""
+    segments, frames, error_um = motion.segments_per_move()
+    yield Figure(
+        "segments_per_move",
+        segments,
+        "segments",
+        f"extension of the exploration, a quintic of 1 s, {frames} servo frames, within"
+        f" {motion.TOLERANCE_UM:g} um and the half tick of rounding: {error_um:.1f} um at most",
+    )
+
+
+def workspace_volume() -> Iterable[Figure]:
+    """How large the workspace is."""
+    volumes = motion.volumes()
+    how = f"of the spring's top, model paper, {volumes.samples} sampled poses; standard error"
+    for name, part, what in (
+        ("workspace_cm3", volumes.reachable, "reachable"),
+        ("workspace_held_cm3", volumes.held, "reachable, and held by tendons that only pull"),
+    ):
+        yield Figure(name, round(part.cm3, 1), "cm3", f"{what}; {how} {part.error_cm3:.2f} cm3")
+
+
 FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     "paper_wall": paper_wall,
     "realtime_factor": realtime_factor,
@@ -284,6 +307,8 @@ FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     "uno_query": uno_query,
     "random_obstacles": random_obstacles,
     "kinematics_speed": kinematics_speed,
+    "motion_segments": motion_segments,
+    "workspace_volume": workspace_volume,
 }
 
 

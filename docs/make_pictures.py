@@ -13,6 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import motion_pictures
 import theory_pictures
 
 from setae.report import explore, pictures
@@ -30,6 +31,7 @@ def draw(run: Path) -> None:
 def main(arguments: list[str]) -> None:
     """Draw the given run, or one made for it."""
     theory_pictures.draw(PICTURES)
+    motion_pictures.draw(PICTURES)
     if arguments:
         draw(Path(arguments[0]))
         return
