@@ -228,7 +228,8 @@ def test_the_truth_is_never_an_old_one() -> None:
     world = started()
     before = world.truth()
     world.arm_move((0.0, 0.0, -20.0), 40.0, 200.0)
-    assert (before.arm_moving, world.arm_moving) == (False, True)
+    assert world.arm_moving
+    assert not before.arm_moving
     world.run(500_000)
     assert world.arm_mm[2] < -1.0
     assert world.truth().arm_mm.tolist() == list(world.arm_mm)
