@@ -69,6 +69,23 @@ def test_a_touch_that_is_too_weak_does_not_stop(driver: Driver) -> None:
     assert driver.frames()[-1].ticks == tuple(map(float, END))
 
 
+def test_a_contact_is_as_fast_with_the_line_full(driver: Driver) -> None:
+    """The loop moved each byte on the sensor's bus: busy, it read samples 10 ms late."""
+    rng = random.Random(4)
+    driver.enable(START)
+    Load(driver)
+    for rate in (0.97, 1.0, 1.03):
+        driver.uno.set_sensor_rate(rate)
+        touched = touch(driver, rng)
+        sample = next(sample for sample in driver.samples() if sample.ready >= touched)
+        frozen_after = first_still(driver.frames()).first_rise - sample.ready
+        assert frozen_after < FRAME_CYCLES + 3_000 * CYCLES_PER_US
+        driver.uno.set_pressure(REST_HPA)
+        driver.session.run_for(100_000)
+        driver.resume()
+        driver.play([START], frames_each=20)
+
+
 def test_a_record_gets_through_a_line_that_is_full(driver: Driver) -> None:
     """Small answers kept the line from ever having room for it, and nothing could resume."""
     driver.enable(START)

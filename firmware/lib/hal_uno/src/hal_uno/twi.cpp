@@ -1,6 +1,8 @@
 #include "hal_uno/twi.h"
 
+#include <avr/interrupt.h>
 #include <avr/io.h>
+#include <util/atomic.h>
 #include <util/delay.h>
 #include <util/twi.h>
 
@@ -13,11 +15,12 @@ constexpr uint32_t kClockHz = 400000;
 constexpr uint8_t kBitRate = (F_CPU / kClockHz - 16) / 2;  // data sheet section 21.5.2
 static_assert(F_CPU / (16 + 2UL * kBitRate) <= kClockHz, "faster than the sensor allows");
 
-// For one step on the bus: a byte takes 23 us. Not for a whole transfer, which lasts as long as
-// the loop has other things to do between its steps.
+// The longest transfer has 7 bytes: 0.16 ms, and other handlers' time.
 constexpr uint16_t kDeadlineTicks = 2000;  // 1 ms
 
-constexpr uint8_t kGo = _BV(TWINT) | _BV(TWEN);
+constexpr uint8_t kGo = _BV(TWINT) | _BV(TWEN) | _BV(TWIE);
+
+Twi* served = nullptr;
 
 }  // namespace
 
@@ -25,6 +28,7 @@ void Twi::begin() {
   // Weak pull-ups, so that a bus with nothing on it reads as idle: then no answer means no
   // sensor.
   PORTC |= _BV(PORTC4) | _BV(PORTC5);
+  served = this;
   TWSR = 0;
   TWBR = kBitRate;
   TWCR = _BV(TWEN);
@@ -48,60 +52,76 @@ void Twi::start(uint8_t address, uint8_t reg, uint8_t size, bool reading) {
   reg_sent_ = false;
   begun_ = false;
   running_ = true;
-  step_ticks_ = servo_pulses::ticks();
+  result_ = Result::kBusy;
+  begun_ticks_ = servo_pulses::ticks();
+  begin_transfer();
+}
+
+void Twi::begin_transfer() {
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {  // all that the handler reads is written before
+    if ((TWCR & _BV(TWSTO)) == 0) {    // the last transfer's STOP is out
+      TWCR = kGo | _BV(TWSTA);
+      begun_ = true;
+      begun_ticks_ = servo_pulses::ticks();
+    }
+  }
 }
 
 Twi::Result Twi::poll() {
   if (!running_)
     return Result::kIdle;
-  const uint16_t now_ticks = servo_pulses::ticks();
-  if (!begun_ && (TWCR & _BV(TWSTO)) == 0) {  // the last transfer's STOP is out
-    TWCR = kGo | _BV(TWSTA);
-    begun_ = true;
-    step_ticks_ = now_ticks;
-  } else if (begun_ && (TWCR & _BV(TWINT))) {
-    step_ticks_ = now_ticks;
-    return advance(TW_STATUS);
-  } else if (static_cast<uint16_t>(now_ticks - step_ticks_) > kDeadlineTicks) {
-    return finish(Result::kFailed);
+  // First what came, then the time: the loop may be late.
+  Result result;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {  // and all that the handler wrote is read after
+    result = result_;
   }
-  return Result::kBusy;
+  if (result == Result::kBusy) {
+    if (!begun_)
+      begin_transfer();
+    if (static_cast<uint16_t>(servo_pulses::ticks() - begun_ticks_) <= kDeadlineTicks)
+      return result;
+    result = Result::kFailed;
+  }
+  running_ = false;
+  if (result == Result::kFailed)
+    recover();
+  return result;
 }
 
 // Data sheet section 21.7, tables 21-3 and 21-4.
-Twi::Result Twi::advance(uint8_t status) {
-  switch (status) {
+void Twi::advance() {
+  switch (TW_STATUS) {
     case TW_START:
       TWDR = static_cast<uint8_t>(address_ << 1) | TW_WRITE;
       TWCR = kGo;
-      return Result::kBusy;
+      return;
     case TW_REP_START:
       TWDR = static_cast<uint8_t>(address_ << 1) | TW_READ;
       TWCR = kGo;
-      return Result::kBusy;
+      return;
     case TW_MT_SLA_ACK:
       TWDR = reg_;
       TWCR = kGo;
-      return Result::kBusy;
+      return;
     case TW_MT_DATA_ACK:
       if (!reg_sent_ && reading_) {
         reg_sent_ = true;
         TWCR = kGo | _BV(TWSTA);
-        return Result::kBusy;
+        return;
       }
       reg_sent_ = true;
       if (moved_ == size_)
         return finish(Result::kDone);
       TWDR = data_[moved_++];
       TWCR = kGo;
-      return Result::kBusy;
+      return;
     case TW_MR_SLA_ACK:
       TWCR = size_ > 1 ? kGo | _BV(TWEA) : kGo;
-      return Result::kBusy;
+      return;
     case TW_MR_DATA_ACK:
       data_[moved_++] = TWDR;
       TWCR = moved_ + 1 < size_ ? kGo | _BV(TWEA) : kGo;
-      return Result::kBusy;
+      return;
     case TW_MR_DATA_NACK:
       data_[moved_++] = TWDR;
       return finish(Result::kDone);
@@ -113,14 +133,10 @@ Twi::Result Twi::advance(uint8_t status) {
   }
 }
 
-Twi::Result Twi::finish(Result result) {
-  running_ = false;
-  if (result == Result::kFailed) {
-    recover();
-  } else {
-    TWCR = kGo | _BV(TWSTO);
-  }
-  return result;
+void Twi::finish(Result result) {
+  // No more interrupts until the next START; recover() takes a failed bus apart.
+  TWCR = result == Result::kFailed ? 0 : _BV(TWINT) | _BV(TWEN) | _BV(TWSTO);
+  result_ = result;
 }
 
 void Twi::recover() {
@@ -146,3 +162,7 @@ void Twi::recover() {
 }
 
 }  // namespace setae
+
+ISR(TWI_vect) {
+  setae::served->advance();
+}

@@ -1,5 +1,6 @@
-// One I2C register transfer at a time, advanced by polling: no call waits, and a transfer with
-// a step that takes too long is given up. (The Arduino Wire library waits for ever on a stuck bus.)
+// One I2C register transfer at a time, byte by byte in the interrupt: however busy the loop is, a
+// transfer takes 0.2 ms. No call waits, and what takes too long is given up. (The Arduino Wire
+// library waits for ever on a stuck bus.)
 #pragma once
 
 #include <stdint.h>
@@ -18,6 +19,7 @@ class Twi {
     kFailed,  // the bus is stuck or disturbed
   };
 
+  // There is one bus, and its handler serves the last one that began.
   void begin();
 
   // Only after a result other than kBusy.
@@ -30,20 +32,25 @@ class Twi {
   // Frees a bus that a slave holds, cut off in the middle of a byte. Takes 0.1 ms.
   void recover();
 
+  // For the handler.
+  void advance();
+
  private:
   void start(uint8_t address, uint8_t reg, uint8_t size, bool reading);
-  Result finish(Result result);
-  Result advance(uint8_t status);
+  void begin_transfer();
+  void finish(Result result);
 
   uint8_t address_ = 0;
   uint8_t reg_ = 0;
   uint8_t size_ = 0;
-  uint8_t moved_ = 0;  // bytes
   bool reading_ = false;
   bool running_ = false;
   bool begun_ = false;  // the START is on its way
+  uint16_t begun_ticks_ = 0;
+  // The handler's, while a transfer runs.
+  uint8_t moved_ = 0;  // bytes
   bool reg_sent_ = false;
-  uint16_t step_ticks_ = 0;  // when the step on the bus began
+  volatile Result result_ = Result::kIdle;
   uint8_t data_[kReadMax] = {};
 };
 
