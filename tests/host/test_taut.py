@@ -218,6 +218,27 @@ def test_the_hole_at_the_wall_itself() -> None:
     np.testing.assert_allclose(back.top_mm, arc.top_mm, atol=1e-9)
 
 
+def test_measured_lengths_get_their_arc_of_least_squares() -> None:
+    random = np.random.default_rng(8)
+    arc = Arc.from_angles(
+        length_mm=random.uniform(25, 68, 300),
+        theta_rad=random.uniform(0, 1.5, 300),
+        alpha_rad=random.uniform(-3, 3, 300),
+    )
+    q = tendons.lengths(arc, GEOMETRY, "taut") + random.normal(scale=0.3, size=(300, 4))
+    back = kinematics.forward(q, GEOMETRY, "taut")
+    miss = q - tendons.lengths(back, GEOMETRY, "taut")
+    slope = np.einsum("pni,pn->pi", tendons.jacobian(back, GEOMETRY, "taut"), miss)
+    np.testing.assert_allclose(slope, 0, atol=1e-9)
+
+
+def test_lengths_far_from_any_arc_are_answered_too() -> None:
+    q = np.random.default_rng(9).uniform(10, 200, (40, 4))
+    back = kinematics.forward(q, GEOMETRY, "taut")
+    assert np.isfinite(back.bend_rad).all()
+    assert (back.length_mm > 0).all()
+
+
 def test_a_spring_of_other_proportions() -> None:
     geometry = Geometry(
         free_length_mm=300, min_length_mm=60, tendon_radius_mm=[8.5, 8.0, 7.0], max_bend_rad=1.5,

@@ -353,19 +353,21 @@ def _fit(q: FloatArray, geometry: Geometry, hint: Hint | None) -> Arc:
     length, bend = parallel.solution(q, geometry)
     scale = float(np.max(layout(geometry).d_mm))
     rest = np.arange(len(q))
-    # Half a spring at most in one go: far-off lengths must not run away.
+    # Half a spring and about a radian at most in one go: far-off lengths must not run away.
     limit = 0.5 * np.mean(q, axis=-1)
     length, bend = np.maximum(length, 1e-3 * limit), bend.copy()
-    for _ in range(50):
+    for _ in range(30):
         derivative = np.empty((len(rest), geometry.tendon_count, 3))
         value = _with_derivative(length[rest], bend[rest], geometry, derivative)
         # Unknowns L and scale·Δ: all in mm.
         derivative[..., 1:] /= scale
         transposed = np.swapaxes(derivative, -1, -2)
         right = transposed @ (q[rest] - value)[..., np.newaxis]
-        step = np.linalg.solve(transposed @ derivative, right)[..., 0]
+        # Far-off lengths may lead to where the matrix is singular; elsewhere this is nothing.
+        step = np.linalg.solve(transposed @ derivative + 1e-14 * np.eye(3), right)[..., 0]
         size = np.max(np.abs(step), axis=-1)
-        step *= np.minimum(1.0, limit[rest] / np.maximum(size, 1e-300))[:, np.newaxis]
+        most = np.minimum(limit[rest], scale)
+        step *= np.minimum(1.0, most / np.maximum(size, 1e-300))[:, np.newaxis]
         length[rest] = np.maximum(length[rest] + step[:, 0], 1e-3 * limit[rest])
         bend[rest] += step[:, 1:] / scale
         rest = rest[size > 1e-14 * length[rest]]
