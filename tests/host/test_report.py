@@ -289,7 +289,34 @@ def test_other_results_give_another_table(tmp_path: Path) -> None:
     # A trial without its end is shown, but neither judged nor counted.
     assert page.table[2][0] == "3 (not complete)"
     assert page.table[2][6:] == ["100", "no", ""]
-    assert "found the obstacle in 1 of 2 trials. It stopped" in page.words
+    assert "found the obstacle in 1 of 2 trials. It did otherwise" in page.words
+    assert "Trial 3 ended early and does not count." in page.words
+    assert page.table[2][3] == "not yet"
+
+
+def test_what_a_reader_is_told_of_few_and_of_interrupted_trials(tmp_path: Path) -> None:
+    """It said "in all 1 trials that the paper reports", and "KeyboardInterrupt"."""
+    write_log(tmp_path / "a.mcap", 1, None)
+    with Recorder(tmp_path / "b.mcap", metadata={"simulated": True, "trial": 2}) as recorder:
+        recorder.experiment(0, "trial_start", {"obstacle": {"below_tip_mm": 35.0}})
+        recorder.experiment(1_000_000, "trial_aborted", {"reason": "KeyboardInterrupt"})
+    page = Page(html.page(explore.trials(tmp_path)))
+    assert "touched nothing. It stopped at the same depth as the paper’s robot." in page.words
+    assert "Trial 2 ended early and does not count." in page.words
+    assert "not complete: somebody ended it with Ctrl-C" in page.words
+    assert "KeyboardInterrupt" not in page.words
+
+
+def test_the_cubes_direction_is_said_where_it_is_not_the_usual_one(tmp_path: Path) -> None:
+    """Trials at 0 and at 135 degrees looked the same in table, tabs and pictures."""
+    labels: list[str] = []
+    for centre_mm in ([50.0, 0.0, -165.0], [-35.355, -35.355, -165.0]):  # y of frame D is -y
+        path = tmp_path / f"{len(labels)}.mcap"
+        cube = {"centre_mm": centre_mm, "edge_mm": 40.0, "yaw_rad": 0.0}
+        with Recorder(path, metadata={"scene": {"cube": cube}}) as recorder:
+            recorder.experiment(0, "trial_start", {"obstacle": {"below_tip_mm": 35.0}})
+        labels.append(load_trial(read(path)).label)
+    assert labels == ["obstacle 35 mm below", "obstacle 35 mm below at α = 135°"]
 
 
 def test_the_page_loads_nothing(run: Path) -> None:

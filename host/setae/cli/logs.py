@@ -21,14 +21,15 @@ def report(log: Path, *more: Path, out: Path | None = None) -> None:
     more
         Further logs for the same page.
     out
-        The page's file, or a folder for it; the default is report.html beside the
-        first log. Pictures and tables go beside the page.
+        A folder for the report, or the page's own file, such as run.html; the
+        default is report.html beside the first log. Pictures and tables go beside
+        the page.
     """
     from setae import report as pages
 
     logs = [record.read(path) for given in (log, *more) for path in _logs_of(given)]
     page = out or (log if log.is_dir() else log.parent)
-    if page.is_dir():
+    if page.suffix.lower() not in (".html", ".htm"):
         page = page / "report.html"
     path = pages.write(logs, page)
     for read in logs:

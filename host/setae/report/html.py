@@ -67,6 +67,7 @@ def page(trials: Sequence[Trial]) -> str:
 
 def finding(rows: Sequence[Comparison]) -> str:
     """Say in a sentence or two what came out."""
+    early = [row.trial.number for row in rows if not row.trial.complete]
     rows = [row for row in rows if row.trial.complete]
     with_obstacle = [row for row in rows if row.trial.obstacle_below_tip_mm is not None]
     without = [row for row in rows if row.trial.obstacle_below_tip_mm is None]
@@ -83,13 +84,22 @@ def finding(rows: Sequence[Comparison]) -> str:
     text = "; ".join(sentences)
     known = [row for row in rows if row.agrees is not None]
     if known:
-        agreeing = sum(bool(row.agrees) for row in known)
-        how_many = "all" if agreeing == len(known) else f"{agreeing} of"
-        text += (
-            f". It stopped at the same depth as the paper’s robot in {how_many} {len(known)} "
-            "trials that the paper reports"
-        )
-    return text[:1].upper() + text[1:] + "." if text else "No trial was completed."
+        text += f". {_beside_the_paper(sum(bool(row.agrees) for row in known), len(known))}"
+    text = text[:1].upper() + text[1:] + "." if text else "No trial was completed."
+    if early and rows:
+        which = "s" if len(early) > 1 else ""
+        numbers = ", ".join(str(number) for number in early)
+        text += f" Trial{which} {numbers} ended early and {'do' if which else 'does'} not count."
+    return text
+
+
+def _beside_the_paper(agreeing: int, known: int) -> str:
+    if known == 1:
+        if agreeing:
+            return "It stopped at the same depth as the paper’s robot"
+        return "It did otherwise than the paper’s robot"
+    how_many = f"all {known}" if agreeing == known else f"{agreeing} of the {known}"
+    return f"It stopped at the same depth as the paper’s robot in {how_many} trials that both ran"
 
 
 def _badges(trials: Sequence[Trial]) -> str:
@@ -119,15 +129,18 @@ def _table(rows: Sequence[Comparison]) -> str:
         trial, theirs = row.trial, row.theirs
         obstacle = trial.obstacle_below_tip_mm
         touched = '<b class="touched">yes</b>' if trial.touched else "no"
+        if not (trial.complete or trial.touched):
+            touched = "not yet"
         same = {
             True: '<span class="same">✓ same</span>',
             False: '<span class="other">✗ differs</span>',
             None: "",
         }[row.agrees]
         cells = [
-            f"{trial.number}" + ("" if trial.complete else " (not complete)"),
-            "none" if obstacle is None else f"{obstacle:g}",
-            f"<b>{trial.descent_mm:g}</b>",
+            f"{trial.number}" + ("" if trial.complete else " <br><small>(not complete)</small>"),
+            ("none" if obstacle is None else f"{obstacle:g}")
+            + (f" <br><small>at α = {trial.azimuth_deg:g}°</small>" if trial.azimuth_deg else ""),
+            f"<b>{trial.descent_mm:g}</b>" if trial.complete else f"{trial.descent_mm:g}",
             touched,
             str(len(trial.contacts)),
             str(sum(len(level.directions) for level in trial.levels)),
@@ -167,8 +180,8 @@ def _origin(trials: Sequence[Trial]) -> str:
         text = f"{tube.inner_radius_mm:g} mm inner radius"
         if beside_mm >= 1.0:
             text += (
-                f"; its axis is {beside_mm:g} mm beside the robot’s, on the side away from the "
-                "obstacle, so that the bristle can reach a cube at the wall"
+                f"; its axis is {beside_mm:g} mm beside the robot’s, on the side away from where a "
+                "cube would be, so that the bristle can reach one at the wall"
             )
         rows.append(("tube", text))
     seeds = dict.fromkeys(trial.log.metadata.get("seed") for trial in trials)
@@ -251,6 +264,7 @@ def _bounds(trials: Sequence[Trial], floor: float) -> list[list[float]]:
 def _trial(trial: Trial) -> dict[str, Any]:
     return {
         "number": trial.number,
+        "label": trial.label,
         "obstacle_below_tip_mm": trial.obstacle_below_tip_mm,
         "descent_mm": trial.descent_mm,
         "duration_s": max(float(trial.seconds(trial.end_us)), 0.1),

@@ -172,6 +172,9 @@ def _frame(axes: Any, trial: Trial, floor: float, top_mm: float, *, margin_mm: f
     axes.set_ylim(flat[:, 1].min() - 6, flat[:, 1].max() + 6)
 
 
+_LABEL_MM = 26.0  # two lines of a label, and some air
+
+
 def _name_parts(axes: Any, trial: Trial, index: int, contact: Contact | None) -> None:
     """Write the parts' names into the margins, each with a line to its part."""
     motion = trial.motion
@@ -189,19 +192,23 @@ def _name_parts(axes: Any, trial: Trial, index: int, contact: Contact | None) ->
     if contact is not None:
         right.append((f"touch:\n{contact.change_hpa:+.0f} hPa", drawing.contact_point_mm(contact)))
     if trial.cube is not None:
-        corner = np.array(trial.cube.centre_mm) + trial.cube.edge_mm * np.array([0, -0.5, -0.3])
+        # In the middle of a face that is seen: the view turns with the tube, and so does the cube.
+        aside = np.array([np.sin(trial.cube.yaw_rad), -np.cos(trial.cube.yaw_rad), -0.6]) / 2
+        corner = np.array(trial.cube.centre_mm) + trial.cube.edge_mm * aside
         right.append((f"cube,\n{trial.cube.edge_mm:.0f} mm", corner))
     edges = axes.get_xlim()
     for names, x, side in ((left, edges[0] + _MARGIN_MM - 14, -1), (right, edges[1] - 50, 1)):
+        above_mm = np.inf  # the last label's height: the next one keeps clear of it
         for text, point in names:
             if not np.isfinite(point).all():
                 continue
             end = view.flat(point)
             touch = text.startswith("touch")
+            above_mm = min(end[1] + (14 if touch else 0), above_mm - _LABEL_MM)
             axes.annotate(
                 text,
                 end,
-                xytext=(x, end[1] + (14 if touch else 0)),
+                xytext=(x, above_mm),
                 ha="right" if side < 0 else "left",
                 va="center",
                 fontsize=12,
@@ -322,7 +329,8 @@ def directions_picture(path: Path, trials: Sequence[Trial]) -> None:
     """Draw, per trial, a rose of the directions felt at each depth; red where it touched."""
     depths = sorted({level.descent_mm for trial in trials for level in trial.levels})
     with _style():
-        figure = _figure(2.9 * max(len(trials), 2) + 0.4, 4.5)
+        # Three roses' width at least, or the line below the title doesn't fit.
+        figure = _figure(2.9 * max(len(trials), 3) + 0.4, 4.5)
         figure.text(0.02, 0.93, "Where the bristle touched", fontsize=17, weight="bold")
         figure.text(
             0.02, 0.865,
@@ -336,10 +344,8 @@ def directions_picture(path: Path, trials: Sequence[Trial]) -> None:
                 (position * width + 0.1 * width, 0.13, 0.8 * width, 0.57), projection="polar"
             )
             _rose(axes, trial, depths)
-            below = trial.obstacle_below_tip_mm
-            label = "no obstacle" if below is None else f"obstacle {below:.0f} mm below"
             figure.text(
-                (position + 0.5) * width, 0.775, f"Trial {trial.number}: {label}",
+                (position + 0.5) * width, 0.775, f"Trial {trial.number}: {trial.label}",
                 ha="center", fontsize=10.5, weight="bold",
             )  # fmt: skip
         _legend(figure)
@@ -425,9 +431,12 @@ def _trials_axes(axes: Any, trials: Sequence[Trial]) -> None:
     for row, item in enumerate(rows):
         trial = item.trial
         colour = palette.CONTACT if trial.touched else palette.PRESSURE
+        if not trial.complete:
+            colour = palette.MUTED
         axes.barh(row, trial.descent_mm, height=0.36, color=colour, alpha=0.88, zorder=2)
         axes.text(
-            trial.descent_mm + 1.5, row, f"{trial.descent_mm:.0f} mm",
+            trial.descent_mm + 1.5, row,
+            f"{trial.descent_mm:.0f} mm" + ("" if trial.complete else ", ended early"),
             va="center", weight="bold", color=colour,
         )  # fmt: skip
         if item.theirs is not None:
@@ -437,17 +446,14 @@ def _trials_axes(axes: Any, trials: Sequence[Trial]) -> None:
             )  # fmt: skip
     axes.set_yticks(
         range(len(rows)),
-        [
-            "no obstacle"
-            if row.trial.obstacle_below_tip_mm is None
-            else f"obstacle {row.trial.obstacle_below_tip_mm:.0f} mm below"
-            for row in rows
-        ],
+        [row.trial.label.replace(" at α", "\nat α") for row in rows],
         color=palette.INK,
     )
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
-    axes.set_xlim(0, 1.18 * max((row.trial.descent_mm for row in rows), default=0.0) or 1.0)
+    deepest = [row.trial.descent_mm for row in rows]
+    deepest += [row.theirs.descent_mm for row in rows if row.theirs is not None]
+    axes.set_xlim(0, 1.18 * max(deepest, default=0.0) or 1.0)
     axes.set_xlabel("descent of the arm (mm)")
     axes.grid(axis="x", color=palette.GRID, zorder=0)
     axes.spines["left"].set_visible(False)

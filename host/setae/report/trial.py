@@ -207,6 +207,22 @@ class Trial:
         return tuple(sorted(found, key=lambda contact: contact.time_us))
 
     @property
+    def label(self) -> str:
+        """What was in the tube: "no obstacle", "obstacle 35 mm below", "… at α = 135°"."""
+        if self.obstacle_below_tip_mm is None:
+            return "no obstacle"
+        text = f"obstacle {self.obstacle_below_tip_mm:g} mm below"
+        return text + (f" at α = {self.azimuth_deg:g}°" if self.azimuth_deg else "")
+
+    @property
+    def azimuth_deg(self) -> float:
+        """Direction in which the cube lies, as α of frame D, from 0 to 360; 0 without a cube."""
+        if self.cube is None:
+            return 0.0
+        x_mm, y_mm, _ = self.cube.centre_mm
+        return round(math.degrees(math.atan2(-y_mm, x_mm)), 1) % 360.0
+
+    @property
     def touched(self) -> bool:
         """Whether anything was touched at all."""
         return bool(self.contacts)
@@ -266,7 +282,7 @@ def load(log: Log, *, number: int = 1) -> Trial:
         obstacle_below_tip_mm=_obstacle_below_tip_mm({**log.metadata, **start.data}),
         descent_mm=float(ends[-1].data.get("descent_mm", deepest_mm)) if ends else deepest_mm,
         complete=bool(ends),
-        problem=str(aborts[-1].data.get("reason", "")) if aborts else "",
+        problem=_problem(str(aborts[-1].data.get("reason", ""))) if aborts else "",
         start_us=start.time_us,
         end_us=ends[-1].time_us if ends else log.span_us[1],
         levels=levels,
@@ -280,6 +296,13 @@ def load(log: Log, *, number: int = 1) -> Trial:
     )
     _watch_until_touch(trial)
     return trial
+
+
+def _problem(reason: str) -> str:
+    """Why a trial ended early, for people who don't know Python."""
+    if reason.startswith("KeyboardInterrupt"):
+        return "somebody ended it with Ctrl-C"
+    return reason
 
 
 def _obstacle_below_tip_mm(about: Mapping[str, Any]) -> float | None:

@@ -356,11 +356,11 @@ function rose(of, until) {
       sector(inner + ring * step, inner + (ring + 1) * step - 2, alpha, style);
     }
   });
+  for (const alpha of alphas) { const [x, y] = polar(95, alpha); parts.push(`<text x="${x}" y="${y}">${alpha}°</text>`); }
   if (of.cube) {
     const deg = Math.atan2(-of.cube.centre_mm[1], of.cube.centre_mm[0]) * 180 / Math.PI, [x, y] = polar(82.5, deg);
     parts.push(`<rect x="-9" y="-2.4" width="18" height="4.8" rx="1" fill="${colour.cube}" transform="translate(${x} ${y}) rotate(${deg + 90})"/>`);
   }
-  for (const alpha of alphas) { const [x, y] = polar(92, alpha); parts.push(`<text x="${x}" y="${y}">${alpha}°</text>`); }
   depths.forEach((depth, ring) => {
     const [x, y] = polar(inner + (ring + 0.5) * step - 1, alphas.length ? alphas[0] + half : 0);
     parts.push(`<text x="${x}" y="${y}" style="font-size:5.6px;paint-order:stroke;stroke:#fff;stroke-width:2px">${depth}</text>`);
@@ -418,14 +418,13 @@ function tick(time) {
   show(now + step);
   if (now >= trial.duration_s) play(false); else requestAnimationFrame(tick);
 }
-const label = (t) => t.obstacle_below_tip_mm === null ? "no obstacle" : `obstacle ${t.obstacle_below_tip_mm} mm below`;
 run.trials.forEach((t, i) => {
   const tab = document.createElement("button");
-  tab.setAttribute("role", "tab"); tab.textContent = `Trial ${t.number}: ${t.obstacle_below_tip_mm === null ? "no obstacle" : `${t.obstacle_below_tip_mm} mm below`}`;
+  tab.setAttribute("role", "tab"); tab.textContent = `Trial ${t.number}: ${t.label.replace(/^obstacle /, "")}`;
   tab.onclick = () => { play(false); choose(i); };
   $("tabs").append(tab);
   const figure = document.createElement("figure");
-  figure.innerHTML = `${rose(t, Infinity)}<figcaption><b>Trial ${t.number}</b>${label(t)}</figcaption>`;
+  figure.innerHTML = `${rose(t, Infinity)}<figcaption><b>Trial ${t.number}</b>${t.label}</figcaption>`;
   const go = () => { play(false); choose(i); $("watch").scrollIntoView({ behavior: "smooth" }); };
   figure.onclick = go;
   $("roses").append(figure);
