@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from setae import pulley, statics, tendons
+from setae import kinematics, pulley, statics, tendons
 from setae.arc import Arc, FloatArray
 from setae.config import Config
 from setae.errors import UnreachableError
@@ -358,15 +358,11 @@ def _project(arc: Arc, config: Config, model: str) -> FloatArray:
     ends_most = np.array([geometry.free_length_mm, -geometry.min_length_mm])
     rule = tendons.model(model)
     count = len(point)
-    step = np.array([1e-5, 1e-7, 1e-7])
     for _ in range(40):
-        top, lengths = _arc(point).top_mm, rule.lengths(_arc(point), geometry)
-        by_top, by_length = np.empty((count, 3, 3)), np.empty((count, len(low), 3))
-        for axis in range(3):
-            beside = point.copy()
-            beside[:, axis] += step[axis]
-            by_top[..., axis] = (_arc(beside).top_mm - top) / step[axis]
-            by_length[..., axis] = (rule.lengths(_arc(beside), geometry) - lengths) / step[axis]
+        here_arc = _arc(point)
+        top, lengths = here_arc.top_mm, rule.lengths(here_arc, geometry)
+        by_top = kinematics.jacobian(here_arc)
+        by_length = rule.derivative(here_arc, geometry)
         theta = np.hypot(point[:, 1], point[:, 2])
         out = point[:, 1:] / np.maximum(theta, 1e-12)[:, np.newaxis]
         bend = np.concatenate([np.zeros((count, 1)), out], axis=-1)
@@ -397,7 +393,7 @@ def _project(arc: Arc, config: Config, model: str) -> FloatArray:
         moved[:, 0] = np.clip(moved[:, 0], geometry.min_length_mm, geometry.free_length_mm)
         change = np.abs(moved - point).max()
         point = moved
-        if change < 1e-10:
+        if change < 1e-9:
             break
     return point
 
@@ -411,13 +407,20 @@ def _nearest_within(
     size = np.maximum(np.einsum("pma,pma->pm", rows, across), 1e-300)
     force = np.zeros(most.shape)
     point = wanted.copy()
-    for _ in range(400):
-        before = point.copy()
-        for row in range(most.shape[1]):
-            beyond = np.einsum("pa,pa->p", rows[:, row], point) - most[:, row]
-            change = np.maximum(beyond / size[:, row], -force[:, row])
-            force[:, row] += change
-            point -= change[:, np.newaxis] * across[:, row]
-        if np.abs(point - before).max() < 1e-13:
-            break
-    return point
+    used = np.zeros(most.shape[1], dtype=bool)
+    while True:
+        # Few limits matter: those that are exceeded so far.
+        beyond = np.einsum("pma,pa->pm", rows, point) - most
+        new = (beyond > 1e-11).any(axis=0) & ~used
+        if not new.any():
+            return point
+        used |= new
+        for _ in range(400):
+            before = point.copy()
+            for row in np.flatnonzero(used):
+                over = (rows[:, row] * point).sum(axis=-1) - most[:, row]
+                change = np.maximum(over / size[:, row], -force[:, row])
+                force[:, row] += change
+                point -= change[:, np.newaxis] * across[:, row]
+            if np.abs(point - before).max() < 1e-12:
+                break

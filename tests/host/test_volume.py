@@ -63,7 +63,7 @@ def test_the_stated_error_is_that_of_other_samples() -> None:
 
 
 def test_what_is_lost_and_what_is_kept_make_up_the_whole() -> None:
-    found = volume.measure(CONFIG, "paper")
+    found = volume.measure(CONFIG, "paper", cells=(12, 10, 16))
     parts = found.held.cm3 + sum(lost.cm3 for lost in found.lost.values())
     assert parts == pytest.approx(found.spring.cm3, abs=1e-9)
     kept = found.held.cm3 + found.lost[Fate.SLACK].cm3 + found.lost[Fate.TENSION].cm3
@@ -71,9 +71,10 @@ def test_what_is_lost_and_what_is_kept_make_up_the_whole() -> None:
 
 
 def test_less_travel_and_weaker_servos_cost_volume_under_their_own_name() -> None:
-    short = volume.measure(changed("servo", pulse_max_us=(1500.0,) * 4), "paper")
-    weak = volume.measure(changed("servo", stall_torque_n_m=0.25), "paper")
-    whole = volume.measure(CONFIG, "paper")
+    few = (12, 10, 16)
+    short = volume.measure(changed("servo", pulse_max_us=(1500.0,) * 4), "paper", cells=few)
+    weak = volume.measure(changed("servo", stall_torque_n_m=0.25), "paper", cells=few)
+    whole = volume.measure(CONFIG, "paper", cells=few)
     assert whole.lost[Fate.TRAVEL].cm3 == whole.lost[Fate.TENSION].cm3 == 0
     assert short.lost[Fate.TRAVEL].cm3 > 1
     assert weak.lost[Fate.TENSION].cm3 > 1

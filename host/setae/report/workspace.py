@@ -152,7 +152,7 @@ def _ends(
     ends = []
     for good, beyond in ((first, first - 1), (last, last + 1)):
         good_mm, bad_mm = length[good], length[np.clip(beyond, 0, len(length) - 1)]
-        for _ in range(14):
+        for _ in range(10):
             middle = (good_mm + bad_mm) / 2
             ok = inside(middle)
             good_mm, bad_mm = np.where(ok, middle, good_mm), np.where(ok, bad_mm, middle)
@@ -349,8 +349,8 @@ def _table(measured: Volumes) -> str:
     )
 
 
-_SECTION_STEP_DEG = 7.5
-_SECTION_LENGTHS, _SECTION_BENDS = 100, 80
+_SECTION_STEP_DEG = 15.0
+_SECTION_LENGTHS, _SECTION_BENDS = 80, 64
 
 
 def _data(config: Config, model: str, measured: Volumes) -> dict[str, Any]:
