@@ -139,3 +139,26 @@ def test_a_stop_while_attaching_leaves_no_partial_pulse(driver: Driver) -> None:
     assert 0 < len(half) < SERVOS
     for servo, pulses in enumerate(by_servo(driver.pulses())):
         assert {pulse.width for pulse in pulses} == {POSE[servo] * CYCLES_PER_TICK}
+
+
+def test_a_stop_at_a_frames_very_start_does_not_pull_back(driver: Driver) -> None:
+    """The frame began between the look at the time and the freeze: its pulses stepped back."""
+    driver.enable((1500, 1500, 1500, 1500))
+    driver.session.run_for(60_000)
+    edge = driver.frames()[-1].first_rise
+    for before_us in range(720, 280, -10):  # of which the stop is on the line for 0.4 ms
+        at = driver.session.telemetry
+        assert at is not None
+        a, b, c, d = at.pulse_ticks
+        driver.queue(ramp((a, b, c, d), (a + 80, b + 80, c + 80, d + 80), 10))
+        driver.wait_for(State.MOVING)
+        driver.session.run_for(60_000)
+        frames = -(-(driver.uno.cycle - edge + before_us * CYCLES_PER_US) // FRAME_CYCLES)
+        driver.uno.run_to(edge + frames * FRAME_CYCLES - before_us * CYCLES_PER_US)
+        driver.session.stop()
+        driver.session.run_for(40_000)
+        driver.resume()
+    for pulses in by_servo(driver.pulses()):
+        widths = [pulse.width for pulse in pulses]
+        assert widths == sorted(widths)
+    _assert_every_pulse_is_as_told(driver)

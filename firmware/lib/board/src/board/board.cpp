@@ -188,8 +188,14 @@ void Board::freeze() {
   const BoardTime now = hal_.now();
   if (now.frame != now_.frame)
     latch_frame(now);
+  const Pulses planned = next_;
   next_ = current_;
-  hal_.set_pulses(next_, attached_);
+  if (hal_.set_pulses(next_, attached_) != now_.frame) {
+    // One has begun just now, with what was planned: then that is where to stay.
+    next_ = planned;
+    latch_frame(hal_.now());
+    hal_.set_pulses(next_, attached_);
+  }
   end_motion();
   drop_plans();
 }

@@ -45,7 +45,9 @@ class Hal {
   // Pulses for the next servo frame and those after it. The last call before a
   // frame starts counts, for all servos at once. Bit i of `attached`: servo i
   // gets pulses.
-  virtual void set_pulses(const Pulses& pulses, uint8_t attached) = 0;
+  // Returns the frame that was running at that moment; a loop that looks at the time itself can
+  // be overtaken by the next frame before it calls.
+  virtual uint32_t set_pulses(const Pulses& pulses, uint8_t attached) = 0;
 
   // Never waits longer than 1 ms.
   virtual SensorReading read_sensor() = 0;

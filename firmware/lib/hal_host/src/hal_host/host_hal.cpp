@@ -58,9 +58,10 @@ void HostHal::write(const uint8_t* data, uint8_t size) {
     transmit_.push(data[i]);
 }
 
-void HostHal::set_pulses(const Pulses& pulses, uint8_t attached) {
+uint32_t HostHal::set_pulses(const Pulses& pulses, uint8_t attached) {
   next_ = pulses;
   next_attached_ = attached;
+  return now().frame;
 }
 
 SensorReading HostHal::read_sensor() {

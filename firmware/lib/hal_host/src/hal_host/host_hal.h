@@ -50,7 +50,7 @@ class HostHal final : public Hal {
   bool read_byte(uint8_t& byte) override { return receive_.pop(byte); }
   uint8_t write_room() override { return transmit_.room(); }
   void write(const uint8_t* data, uint8_t size) override;
-  void set_pulses(const Pulses& pulses, uint8_t attached) override;
+  uint32_t set_pulses(const Pulses& pulses, uint8_t attached) override;
   SensorReading read_sensor() override;
   protocol::ResetCause reset_cause() override { return reset_cause_; }
   Retained& retained() override { return retained_; }

@@ -105,7 +105,7 @@ void begin() {
   }
 }
 
-void set(const Pulses& pulses, uint8_t attached) {
+uint32_t set(const Pulses& pulses, uint8_t attached) {
   Output output;
   for (uint8_t i = 0; i < protocol::kServos; ++i) {
     uint16_t ticks = pulses.ticks[i];
@@ -118,9 +118,12 @@ void set(const Pulses& pulses, uint8_t attached) {
     output.width[i] = ticks;
   }
   output.attached = attached;
+  uint32_t running;
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
     wanted = output;
+    running = frame;
   }
+  return running;
 }
 
 void detach_from_interrupt() {

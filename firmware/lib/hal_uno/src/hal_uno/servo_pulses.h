@@ -13,8 +13,8 @@ namespace servo_pulses {
 
 void begin();
 
-// For the next frame and those after it, all four at once.
-void set(const Pulses& pulses, uint8_t attached);
+// For the frame after the returned one and those that follow, all four at once.
+uint32_t set(const Pulses& pulses, uint8_t attached);
 // Lets the pulses end with this frame. For interrupt handlers.
 void detach_from_interrupt();
 

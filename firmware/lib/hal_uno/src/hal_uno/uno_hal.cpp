@@ -56,9 +56,10 @@ void UnoHal::write(const uint8_t* data, uint8_t size) {
   uart::write(data, size);
 }
 
-void UnoHal::set_pulses(const Pulses& pulses, uint8_t attached) {
-  servo_pulses::set(pulses, attached);
+uint32_t UnoHal::set_pulses(const Pulses& pulses, uint8_t attached) {
+  const uint32_t frame = servo_pulses::set(pulses, attached);
   retained_memory::seal();  // once a frame, after the board wrote it
+  return frame;
 }
 
 SensorReading UnoHal::read_sensor() {

@@ -18,7 +18,7 @@ class UnoHal final : public Hal {
   bool read_byte(uint8_t& byte) override;
   uint8_t write_room() override;
   void write(const uint8_t* data, uint8_t size) override;
-  void set_pulses(const Pulses& pulses, uint8_t attached) override;
+  uint32_t set_pulses(const Pulses& pulses, uint8_t attached) override;
   SensorReading read_sensor() override;
   protocol::ResetCause reset_cause() override;
   Retained& retained() override;
