@@ -1,0 +1,38 @@
+"""The robot's description: what it measures, how its servos are set up, how it moves.
+
+`load` reads TOML. A user's file gives only what differs from the paper's robot,
+``robots/paper.toml``. Every key is checked; the unit is part of its name.
+"""
+
+from __future__ import annotations
+
+from setae.config.geometry import Geometry
+from setae.config.reading import load, loads
+from setae.config.sections import (
+    SERVOS,
+    TENDON_MODELS,
+    Bristle,
+    Config,
+    Explore,
+    Motion,
+    Servo,
+    Spring,
+    Stage,
+    Tube,
+)
+
+__all__ = [
+    "SERVOS",
+    "TENDON_MODELS",
+    "Bristle",
+    "Config",
+    "Explore",
+    "Geometry",
+    "Motion",
+    "Servo",
+    "Spring",
+    "Stage",
+    "Tube",
+    "load",
+    "loads",
+]

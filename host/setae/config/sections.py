@@ -1,0 +1,299 @@
+"""The other sections, and the robot that they make together."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+from setae.config.geometry import Geometry
+from setae.config.keys import Section, key, toml_lines
+from setae.errors import ConfigError
+
+SERVOS = 4
+"""How many the board drives."""
+
+TENDON_MODELS = ("paper", "parallel", "taut")
+"""Names that the key ``model`` may have; `setae.tendons` has a function for each."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spring(Section):
+    """The backbone's elasticity.
+
+    Attributes
+    ----------
+    axial_rate_n_per_mm
+        Spring constant.
+    mean_diameter_mm
+        Mean diameter of the coils.
+    poisson_ratio
+        Of the wire's material.
+    bending_factor
+        Measured bending stiffness over theory's.
+    """
+
+    axial_rate_n_per_mm: float = key(low=1e-4, high=1000)
+    mean_diameter_mm: float = key(low=0.1, high=1000)
+    poisson_ratio: float = key(low=0, high=0.5)
+    bending_factor: float = key(low=0.01, high=100)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Servo(Section):
+    """The servos and how they are mounted; one entry for each tendon.
+
+    Attributes
+    ----------
+    pulse_min_us, pulse_max_us
+        Pulses that the servo can follow without running into its end stop.
+    pulse_free_us
+        Pulse at which the tendon has the spring's free length: the servo's trim.
+    direction
+        +1 where a longer pulse winds the tendon up, -1 where it unwinds.
+    us_per_degree
+        Change of the pulse for a degree of the horn.
+    growth_mm_per_turn
+        How much the winding radius grows with each turn, as layers pile up; 0 where
+        the turns lie side by side. At the free length it is `pulley_radius_mm`.
+    speed_mm_s
+        Fastest tendon that the servo manages.
+    lag_ms
+        Time from a pulse to the horn's motion.
+    stall_torque_n_m
+        Torque at which the servo stalls, at the voltage that it gets.
+    torque_part
+        Part of the stall torque that it holds for long without getting hot.
+    min_tension_n
+        Preload: tension that each tendon needs to count as taut.
+    """
+
+    pulse_min_us: tuple[float, ...] = key(low=500, high=2500, count=(SERVOS, SERVOS))
+    pulse_max_us: tuple[float, ...] = key(low=500, high=2500, count=(SERVOS, SERVOS))
+    pulse_free_us: tuple[float, ...] = key(low=500, high=2500, count=(SERVOS, SERVOS))
+    direction: tuple[int, ...] = key(low=-1, high=1, choices=(1, -1), count=(SERVOS, SERVOS))
+    us_per_degree: tuple[float, ...] = key(low=1, high=100, count=(SERVOS, SERVOS))
+    growth_mm_per_turn: tuple[float, ...] = key(low=0, high=50, count=(SERVOS, SERVOS))
+    speed_mm_s: float = key(low=1, high=5000)
+    lag_ms: float = key(low=0, high=1000)
+    stall_torque_n_m: float = key(low=1e-4, high=1000)
+    torque_part: float = key(low=0.01, high=1)
+    min_tension_n: float = key(low=0, high=1000)
+
+    def _contradiction(self) -> str:
+        for index, (low, free, high) in enumerate(
+            zip(self.pulse_min_us, self.pulse_free_us, self.pulse_max_us, strict=True)
+        ):
+            if not low < high:
+                return (
+                    f"servo {index}: pulse_min_us = {low:g} must be below pulse_max_us = {high:g}."
+                )
+            if not low <= free <= high:
+                return (
+                    f"servo {index}: pulse_free_us = {free:g} must lie from "
+                    f"pulse_min_us = {low:g} to pulse_max_us = {high:g}."
+                )
+        return ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion(Section):
+    """How fast the robot moves, and which tendon model it uses unless told otherwise.
+
+    Attributes
+    ----------
+    model
+        Tendon model, see `setae.tendons`.
+    slew_mm_s
+        The board refuses and limits any tendon faster than this.
+    move_speed_mm_s, retract_speed_mm_s, relax_speed_mm_s
+        Fastest tendon in an ordinary move, in the reflex, while unwinding.
+    probe_speed_mm_s
+        Tip in a guarded move.
+    acceleration_mm_s2, jerk_mm_s3
+        Highest of any tendon, in every planned motion.
+    tolerance_um
+        How far the straight lines that the board plays may leave the planned motion
+        of a tendon, besides the rounding to ticks.
+    hold_timeout_s
+        Holding this long without a host relaxes the robot; 0 never does.
+    """
+
+    model: str = key(low=0, high=0, choices=TENDON_MODELS)
+    slew_mm_s: float = key(low=1, high=5000)
+    move_speed_mm_s: float = key(low=0.1, high=5000)
+    probe_speed_mm_s: float = key(low=0.1, high=5000)
+    retract_speed_mm_s: float = key(low=0.1, high=5000)
+    relax_speed_mm_s: float = key(low=0.1, high=5000)
+    acceleration_mm_s2: float = key(low=1, high=1e6)
+    jerk_mm_s3: float = key(low=1, high=1e9)
+    tolerance_um: float = key(low=0, high=1e4)
+    hold_timeout_s: int = key(low=0, high=65535, integer=True)
+
+    def _contradiction(self) -> str:
+        for name in ("move_speed_mm_s", "retract_speed_mm_s", "relax_speed_mm_s"):
+            if getattr(self, name) > self.slew_mm_s:
+                return (
+                    f"{name} = {getattr(self, name):g} must not exceed "
+                    f"slew_mm_s = {self.slew_mm_s:g}."
+                )
+        return ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bristle(Section):
+    """When a change of pressure is a contact.
+
+    Attributes
+    ----------
+    threshold_hpa
+        Absolute change against the baseline, in a guarded move.
+    consecutive
+        Samples in a row that must cross it.
+    coarse_threshold_hpa
+        The same for unguarded motion; 0 switches it off.
+    """
+
+    threshold_hpa: float = key(low=0.1, high=1000)
+    consecutive: int = key(low=1, high=8, integer=True)
+    coarse_threshold_hpa: float = key(low=0, high=1000)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage(Section):
+    """How the robot arm that carries setae moves.
+
+    Attributes
+    ----------
+    speed_mm_s, acceleration_mm_s2
+        Of its linear moves.
+    """
+
+    speed_mm_s: float = key(low=0.1, high=1000)
+    acceleration_mm_s2: float = key(low=1, high=10000)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explore(Section):
+    """The exploration of a tube, section III-D of the paper.
+
+    Attributes
+    ----------
+    step_mm, steps
+        The arm's steps downwards.
+    compressed_length_mm
+        Length between two directions.
+    target_radius_mm, target_height_mm
+        Targets (radius·cos α, radius·sin α, height) in frame D.
+    directions
+        Number of directions α.
+    extend_duration_s, retract_duration_s
+        Of the two motions of a direction.
+    """
+
+    step_mm: float = key(low=0.1, high=1000)
+    steps: int = key(low=1, high=1000, integer=True)
+    compressed_length_mm: float = key(low=0.1, high=5000)
+    target_radius_mm: float = key(low=0, high=5000)
+    target_height_mm: float = key(low=0.1, high=5000)
+    directions: int = key(low=1, high=360, integer=True)
+    extend_duration_s: float = key(low=0.02, high=600)
+    retract_duration_s: float = key(low=0.02, high=600)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tube(Section):
+    """The scene of the exploration.
+
+    Attributes
+    ----------
+    inner_radius_mm
+        Of the tube.
+    axis_offset_mm
+        Distance of the tube's axis from the robot's, opposite the obstacle.
+    cube_edge_mm
+        Edge of the cube that is the obstacle.
+    obstacle_below_tip_mm
+        Depths of the cube's top below the compressed bristle's tip, one a trial.
+    """
+
+    inner_radius_mm: float = key(low=1, high=10000)
+    axis_offset_mm: float = key(low=0, high=10000)
+    cube_edge_mm: float = key(low=0.1, high=10000)
+    obstacle_below_tip_mm: tuple[float, ...] = key(low=-1000, high=10000, count=(1, 100))
+
+
+SECTIONS: dict[str, type[Section]] = {
+    "geometry": Geometry,
+    "spring": Spring,
+    "servo": Servo,
+    "motion": Motion,
+    "bristle": Bristle,
+    "stage": Stage,
+    "explore": Explore,
+    "tube": Tube,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Config:
+    """A whole robot. Made by `load`; change a copy with `dataclasses.replace`.
+
+    Attributes
+    ----------
+    geometry, spring, servo, motion, bristle, stage, explore, tube
+        The sections.
+    simulator
+        Parameters of the simulator, (its own name, value), sorted by name.
+
+    Examples
+    --------
+    >>> from setae import config
+    >>> config.load().motion.model
+    'paper'
+    """
+
+    geometry: Geometry
+    spring: Spring
+    servo: Servo
+    motion: Motion
+    bristle: Bristle
+    stage: Stage
+    explore: Explore
+    tube: Tube
+    simulator: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        count = self.geometry.tendon_count
+        if count != SERVOS:
+            raise ConfigError(
+                f"[geometry] tendon_angles_deg has {count} entries.",
+                f"The board drives {SERVOS} servos: give {SERVOS}. "
+                "`Geometry` alone takes any number.",
+            )
+        most_n = self.servo.stall_torque_n_m * self.servo.torque_part * 1e3
+        most_n /= self.geometry.pulley_radius_mm
+        if self.servo.min_tension_n >= most_n:
+            raise ConfigError(
+                f"[servo] min_tension_n = {self.servo.min_tension_n:g} must be below the "
+                f"{most_n:.3g} N that a servo holds.",
+                "That is stall_torque_n_m times torque_part over pulley_radius_mm.",
+            )
+        length, low, high = (
+            self.explore.compressed_length_mm,
+            self.geometry.min_length_mm,
+            self.geometry.free_length_mm,
+        )
+        if not low <= length <= high:
+            raise ConfigError(
+                f"[explore] compressed_length_mm = {length:g} must lie from "
+                f"min_length_mm = {low:g} to free_length_mm = {high:g}."
+            )
+
+    def to_toml(self) -> str:
+        """The whole configuration as TOML, for logs: `loads` reads it back."""
+        lines: list[str] = []
+        for name in SECTIONS:
+            lines += [f"[{name}]", *toml_lines(getattr(self, name)), ""]
+        lines.append("[simulator]")
+        lines.extend(f"{json.dumps(name)} = {value!r}" for name, value in self.simulator)
+        return "\n".join(lines) + "\n"
