@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 
 from setae.errors import (
@@ -14,10 +15,12 @@ from setae.errors import (
 )
 from setae.link.events import Event, FaultReported, TelemetryReceived, Ticket, Tripped
 from setae.link.session import Session, refused_error
+from setae.servo import Ticks, segment_messages
 from setae_protocol.messages import (
     PRESSURE_LSB_PER_HPA,
     SERVO_FRAME_US,
     HostMessage,
+    Segment,
     State,
     Telemetry,
     TripCause,
@@ -26,7 +29,8 @@ from setae_protocol.messages import (
 REPLY_S = 2.0
 """What an answer may take beyond the motion itself, the link's retries included."""
 
-Ticks = tuple[int, int, int, int]
+# What the board has of a motion, in servo frames: a second, which it goes on without the host.
+_AHEAD_FRAMES = 50
 
 
 class Board:
@@ -61,6 +65,11 @@ class Board:
     def state(self) -> State:
         """What the board does."""
         return self._session.state
+
+    @property
+    def epoch(self) -> int:
+        """What motions have to name for the board to take them."""
+        return self._session.epoch
 
     @property
     def reported(self) -> bool:
@@ -103,6 +112,37 @@ class Board:
         return (
             self.state is State.HOLDING and telemetry.queued == 0 and telemetry.pulse_ticks == ticks
         )
+
+    def play(self, segments: Sequence[Segment], duration_s: float) -> None:
+        """Have the board play segments, and wait until it has."""
+        if not segments:
+            return
+        final = segments[-1].target_ticks
+        play = self.playing(segments)
+        self.wait(lambda: play() and self.at_rest(final), duration_s + REPLY_S, "the move to end")
+
+    def playing(self, segments: Sequence[Segment]) -> Callable[[], bool]:
+        """Make what hands segments to the link, call after call; True once all are.
+
+        The board holds fifty, which may be many seconds. It gets them about a second
+        ahead, so that it soon holds if the host dies.
+        """
+        waiting = deque(segment_messages(segments, epoch=self.epoch, max_frames=_AHEAD_FRAMES // 2))
+        begin_us = self._session.now_us
+        sent_us = 0
+
+        def play() -> bool:
+            nonlocal sent_us
+            while waiting:
+                frames = sum(part.duration_frames for part in waiting[0].segments)
+                ahead_us = sent_us - (self._session.now_us - begin_us)
+                if ahead_us + frames * SERVO_FRAME_US > _AHEAD_FRAMES * SERVO_FRAME_US:
+                    return False
+                sent_us += frames * SERVO_FRAME_US
+                self.send(waiting.popleft())
+            return True
+
+        return play
 
     def wait(
         self,

@@ -31,6 +31,7 @@ FRAME_S = messages.SERVO_FRAME_US * 1e-6
 """Duration of a servo frame."""
 
 IntArray = npt.NDArray[np.int64]
+Ticks = tuple[int, int, int, int]
 
 _NO_SEGMENT = messages.Segment(duration_frames=0, target_ticks=(0, 0, 0, 0))
 
@@ -242,7 +243,7 @@ class ServoModel:
         )
 
 
-def _four(values: npt.ArrayLike) -> tuple[int, int, int, int]:
+def _four(values: npt.ArrayLike) -> Ticks:
     w, x, y, z = (int(value) for value in np.asarray(values))
     return w, x, y, z
 

@@ -1,0 +1,287 @@
+"""A robot's controls without its motions: on, off, stop, and what it reports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from setae import kinematics
+from setae.arc import Arc
+from setae.board import REPLY_S, Board, name_of
+from setae.config import Config
+from setae.errors import ConfigError, PoseUnknownError
+from setae.link.session import Session
+from setae.planning import Planner
+from setae_protocol.messages import (
+    SERVO_FRAME_US,
+    Enable,
+    HelloReply,
+    Limits,
+    Limp,
+    Relax,
+    Resume,
+    SetLimits,
+    State,
+    Telemetry,
+)
+
+OnCommand = Callable[[str, Mapping[str, Any]], None]
+
+
+class Controls:
+    """What `setae.robot.Robot` is besides its motions; parameters as there."""
+
+    def __init__(
+        self, session: Session, config: Config, *, leave: Literal["relax", "hold"] = "relax"
+    ) -> None:
+        self.session = session
+        self.config = config
+        self.leave = leave
+        self.on_command: OnCommand | None = None
+        self._planner = Planner(config)
+        self._pose_known = False
+        self._board = Board(session)
+
+    # ------------------------------------------------------------------- life
+
+    def prepare(self) -> None:
+        """Give the board the configuration's limits, and check that it holds them.
+
+        Raises
+        ------
+        ConfigError
+            The board isn't relaxed and holds other limits.
+        """
+        self._board.wait(lambda: self._board.reported, REPLY_S, "the board's first telemetry")
+        wanted = self._planner.limits
+        if self.state is State.RELAXED:
+            self._board.request(wanted)
+        held = self.session.read_limits()
+        if _values(held) == _values(wanted):
+            return
+        if self.state is State.RELAXED:
+            raise ConfigError(
+                "The board took the limits, but reads back others.",
+                "Flash the firmware of this version with `setae flash`.",
+            )
+        raise ConfigError(
+            f"The board is {name_of(self.state)} under other limits than this configuration's.",
+            "Relax it with the configuration it was started with, or reset it.",
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None:
+                if self.leave == "relax" and self.state is State.HOLDING:
+                    self.relax()
+            elif self.state not in (State.RELAXED, State.STOPPED):
+                self.stop()
+        except Exception as failure:
+            if error is None:
+                raise
+            error.add_note(f"Stopping failed too: {failure}")
+        finally:
+            self.session.close()
+
+    # ------------------------------------------------------------------ facts
+
+    @property
+    def now_us(self) -> int:
+        """The session's clock."""
+        return self.session.now_us
+
+    @property
+    def state(self) -> State:
+        """What the board does."""
+        return self.session.state
+
+    @property
+    def hello(self) -> HelloReply:
+        """What the board said of itself when the session opened."""
+        assert self.session.hello is not None, "a Robot gets an open session"
+        return self.session.hello
+
+    @property
+    def firmware_version(self) -> str:
+        """Version of the board's firmware, such as 0.1.0."""
+        reply = self.hello
+        return f"{reply.firmware_major}.{reply.firmware_minor}.{reply.firmware_patch}"
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """The board's latest report."""
+        return self._board.telemetry
+
+    @property
+    def pose_known(self) -> bool:
+        """Whether the board knows where its servos are."""
+        return self._pose_known or bool(self.hello.pose_known)
+
+    @property
+    def lengths_mm(self) -> npt.NDArray[np.float64]:
+        """Commanded tendon lengths, (4,).
+
+        Raises
+        ------
+        PoseUnknownError
+            Nobody knows them before the first enable().
+        """
+        if not self.pose_known:
+            raise PoseUnknownError("Nobody knows where the servos are.")
+        return self._planner.servos.lengths_mm(self.telemetry.pulse_ticks)
+
+    @property
+    def pose(self) -> Arc:
+        """The commanded pose: the arc that fits the commanded lengths best."""
+        return kinematics.forward(
+            self.lengths_mm, self.config.geometry, model=self.config.motion.model
+        )
+
+    @property
+    def position_mm(self) -> npt.NDArray[np.float64]:
+        """Commanded place of the spring's top U in frame D, (3,)."""
+        return np.asarray(kinematics.position(self.pose), dtype=float)
+
+    @property
+    def pressure_hpa(self) -> float | None:
+        """The latest sample of the bristle's sensor; None before the first."""
+        return self._board.pressure_hpa
+
+    # ------------------------------------------------------------ on, off, stop
+
+    def enable(self, *, accept_jump: bool = False) -> None:
+        """Switch the servos on at the commanded pose, one after the other.
+
+        Parameters
+        ----------
+        accept_jump
+            Go on though nobody knows where the servos are: they jump to the
+            free length, which can release up to 50 mm of tendon at full speed.
+
+        Raises
+        ------
+        PoseUnknownError
+            The pose is unknown and `accept_jump` is False.
+        """
+        self._told("enable", accept_jump=accept_jump)
+        if self.state is State.HOLDING:
+            return
+        if self.state is not State.RELAXED:
+            self._board.require_holding()
+        if self.pose_known:
+            ticks = self.telemetry.pulse_ticks
+        elif accept_jump:
+            ticks = self._planner.free_ticks
+        else:
+            raise PoseUnknownError("Nobody knows where the servos are: the first pulse may jump.")
+        self._board.request(Enable(pulse_ticks=ticks))
+        self._board.wait(lambda: self._board.at_rest(ticks), REPLY_S, "the servos to attach")
+        self._pose_known = True
+
+    def relax(self) -> None:
+        """Unwind slowly to the free length, then switch the servos off."""
+        self._told("relax")
+        if self.state is State.RELAXED:
+            return
+        speed_mm_s = self.config.motion.relax_speed_mm_s
+        slew = self._planner.servos.speed_ticks(speed_mm_s)
+        free = self._planner.free_ticks
+        distance = max(abs(a - b) for a, b in zip(free, self.telemetry.pulse_ticks, strict=True))
+        self._board.request(Relax(slew_ticks=slew, free_ticks=free))
+        self._board.wait(
+            lambda: self.state is State.RELAXED,
+            distance / slew * SERVO_FRAME_US / 1e6 + REPLY_S,
+            "the robot to relax",
+        )
+
+    def limp(self) -> None:
+        """Switch the servos off at once, in whatever state; their gears still hold.
+
+        A stopped, tripped or faulty board stays so until `resume`.
+        """
+        self._told("limp")
+        self._board.request(Limp(reserved=0), watch=False)
+        self._board.wait(
+            lambda: self.telemetry.attached == 0, REPLY_S, "the servos to go off", watch=False
+        )
+
+    def stop(self) -> None:
+        """Freeze now, and wait until the board says so. Only `resume` ends it.
+
+        Raises
+        ------
+        LinkError
+            The board didn't confirm. It goes on with what it has queued, at most
+            a second, then holds.
+        """
+        ticket = self.session.send_stop()
+        try:
+            self._told("stop")
+        finally:
+            # Whatever the log says: the stop is on its way, and is seen through.
+            self.session.run_until(
+                lambda: ticket.done, round(REPLY_S * 1e6), what="The stop's confirmation"
+            )
+
+    def resume(self) -> None:
+        """Leave stopped, tripped or fault; a running reflex is waited for."""
+        if self.state in (State.RELAXED, State.HOLDING):
+            return
+        if self.state is State.TRIPPED:
+            self._board.wait(
+                lambda: self.state is not State.TRIPPED or self._board.reflex_ended(),
+                REPLY_S + 60.0,
+                "the reflex to end",
+                watch=False,
+            )
+        self._told("resume")
+        self._board.forget_records()
+        self._board.request(Resume(epoch=self.session.epoch), watch=False)
+        self._board.wait(
+            lambda: self.state in (State.HOLDING, State.RELAXED),
+            REPLY_S,
+            "the board to resume",
+            watch=False,
+        )
+        self._board.next_report()
+
+    # ---------------------------------------------------------------------- waits
+
+    def wait(self, done: Callable[[], bool], *, timeout_s: float, what: str) -> None:
+        """Wait for something, with the robot watched meanwhile.
+
+        Parameters
+        ----------
+        done
+            Asked after everything that happens.
+        timeout_s
+            After this long, DeadlineError.
+        what
+            What is waited for, for the message.
+        """
+        self._board.wait(done, timeout_s, what)
+
+    def host_time_us(self, frame: int, phase_us: int) -> int:
+        """A board time on the session's clock."""
+        return self._board.host_time_us(frame, phase_us)
+
+    def _told(self, name: str, **args: Any) -> None:
+        if self.on_command is not None:
+            self.on_command(name, args)
+
+
+def _values(limits: Limits | SetLimits) -> bytes:
+    # Both messages have the same payload.
+    return limits.pack()
