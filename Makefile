@@ -97,7 +97,7 @@ pictures: .venv/.installed ## run the exploration, and draw the documentation's 
 
 # In this order, so that what fails fastest comes first and pytest's count comes last.
 .PHONY: test
-test: ## check everything: style, types, drift, firmware, wheel, behaviour
+test: ## check everything: style, types, drift, firmware, wheel, pages, behaviour
 	@.ci/need --install python compiler $(AVR_PACKAGES)
 	@$(PIO) --version # sets PlatformIO up: what that lacks is said first, not after minutes
 	@$(MAKE) --no-print-directory lint
@@ -105,6 +105,7 @@ test: ## check everything: style, types, drift, firmware, wheel, behaviour
 	@$(MAKE) --no-print-directory firmware-test
 	@$(MAKE) --no-print-directory firmware
 	@$(MAKE) --no-print-directory wheel
+	@$(MAKE) --no-print-directory docs
 	@$(MAKE) --no-print-directory pytest
 
 .PHONY: lint

@@ -1,12 +1,12 @@
 """What the tendons must pull to hold a pose, and where the spring rests if they can't.
 
 The spring as a linear beam, its stiffnesses constant per free length L₀, without
-weight, contact or friction; its energy over compression c = L₀ − L and bending Δ is
+weight, contact or friction; its energy over compression c = L₀ − L and bending Δ is::
 
     E = ½ k c² + ½ (B / L₀) |Δ|²        B = k L₀ D² (1 + ν) / (2 (2 + ν))
 
 times the configuration's `bending_factor`. Tendons at their distances d from the
-axis (``parallel``) shorten by c + d Δ·u, so the tensions balance it where
+axis (``parallel``) shorten by c + d Δ·u, so the tensions balance it where::
 
     Σ T = k c        Σ T d u = (B / L₀) Δ        T ≥ 0
 
