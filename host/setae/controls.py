@@ -13,9 +13,10 @@ from setae import kinematics
 from setae.arc import Arc
 from setae.board import REPLY_S, Board, name_of
 from setae.config import Config
-from setae.errors import ConfigError, PoseUnknownError
+from setae.errors import ConfigError, PoseUnknownError, UnreachableError
 from setae.link.session import Session
 from setae.planning import Planner
+from setae.servo import Ticks
 from setae_protocol.messages import (
     SERVO_FRAME_US,
     Enable,
@@ -167,28 +168,46 @@ class Controls:
         Parameters
         ----------
         accept_jump
-            Go on though nobody knows where the servos are: they jump to the
-            free length, which can release up to 50 mm of tendon at full speed.
+            Go on though nobody knows where the servos are, or they were left where
+            this configuration doesn't allow them: they jump to the free length, which
+            can release up to 50 mm of tendon at full speed.
 
         Raises
         ------
         PoseUnknownError
             The pose is unknown and `accept_jump` is False.
+        UnreachableError
+            The pose is outside of this configuration's limits, as after a change of the
+            configuration, and `accept_jump` is False.
+        TrippedError
+            A far jump swung the bristle, and the board stopped half-way: `resume`
+            switches the other servos on.
         """
         self._told("enable", accept_jump=accept_jump)
         if self.state is State.HOLDING:
             return
         if self.state is not State.RELAXED:
             self._board.require_holding()
-        if self.pose_known:
-            ticks = self.telemetry.pulse_ticks
-        elif accept_jump:
-            ticks = self._planner.free_ticks
-        else:
-            raise PoseUnknownError("Nobody knows where the servos are: the first pulse may jump.")
+        ticks = self._first_ticks(accept_jump)
         self._board.request(Enable(pulse_ticks=ticks))
-        self._board.wait(lambda: self._board.at_rest(ticks), REPLY_S, "the servos to attach")
         self._pose_known = True
+        self._board.wait(lambda: self._board.at_rest(ticks), REPLY_S, "the servos to attach")
+
+    def _first_ticks(self, accept_jump: bool) -> Ticks:
+        """Where to switch the servos on: where they are, unless they have to jump."""
+        left = self.telemetry.pulse_ticks
+        why = self._planner.excluded(left) if self.pose_known else ""
+        if self.pose_known and not why:
+            return left
+        if accept_jump:
+            return self._planner.free_ticks
+        if why:
+            raise UnreachableError(
+                f"The robot was left where this configuration doesn't allow it. {why}",
+                "Enable it with the configuration that it was left under. Or: "
+                + PoseUnknownError.default_remedy,
+            )
+        raise PoseUnknownError("Nobody knows where the servos are: the first pulse may jump.")
 
     def relax(self) -> None:
         """Unwind slowly to the free length, then switch the servos off."""

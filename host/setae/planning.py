@@ -72,19 +72,32 @@ class Planner:
 
     # ---------------------------------------------------------------- the board's limits
 
-    def require_allowed(self, ticks: Ticks) -> None:
-        """Refuse here what the board would refuse."""
+    def excluded(self, ticks: Ticks) -> str:
+        """Why the board refuses to hold at pulses, as a sentence; empty if it doesn't."""
         limits = self.limits
+        ends = zip(limits.pulse_min_ticks, limits.pulse_max_ticks, strict=True)
+        for index, (tick, (low, high)) in enumerate(zip(ticks, ends, strict=True)):
+            if not low <= tick <= high:
+                at_us, low_us, high_us = (part / servo.TICKS_PER_US for part in (tick, low, high))
+                return (
+                    f"Servo {index} would be at a pulse of {at_us:g} µs; the spring allows it "
+                    f"{low_us:g} to {high_us:g} µs."
+                )
         for pair, (a, b) in enumerate(((0, 2), (1, 3))):
             total, difference = ticks[a] + ticks[b], ticks[a] - ticks[b]
             low, high = limits.pair_sum_min_ticks[pair], limits.pair_sum_max_ticks[pair]
             least = limits.pair_difference_min_ticks[pair]
             most = limits.pair_difference_max_ticks[pair]
             if not (low <= total <= high and least <= difference <= most):
-                raise UnreachableError(
-                    f"Tendons {a} and {b} at these lengths would crush or over-bend the spring.",
-                    "Choose lengths that belong to a pose inside the workspace.",
-                )
+                return f"Tendons {a} and {b} at these lengths would crush or over-bend the spring."
+        return ""
+
+    def require_allowed(self, ticks: Ticks) -> None:
+        """Refuse here what the board would refuse."""
+        if why := self.excluded(ticks):
+            raise UnreachableError(
+                why, "Choose lengths that belong to a pose inside the workspace."
+            )
 
     # ------------------------------------------------------------------------- motions
 

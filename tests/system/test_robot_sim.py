@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tests.system.robots import WALL_AHEAD, Bench, bench, compressed, run_world
 
+from setae.config import loads
 from setae.errors import (
     BoardResetError,
     FaultError,
@@ -24,6 +25,7 @@ from setae.errors import (
 )
 from setae.link.events import Refused, Tripped
 from setae.link.lossy import Faults
+from setae.robot import Robot
 from setae.scene import Obstacle
 from setae.servo import segment_messages
 from setae.sim import SensorFault
@@ -238,6 +240,59 @@ def test_an_unknown_pose_needs_a_decision_before_the_first_pulse() -> None:
         assert made.world.truth().attached == (False,) * 4
         made.robot.enable(accept_jump=True)
         assert made.world.truth().attached == (True,) * 4
+
+
+NARROW = {
+    "Servo 0": "[geometry]\nmin_length_mm = 64\n[explore]\ncompressed_length_mm = 65",
+    "Tendons 0 and 2": "[geometry]\nmax_bend_deg = 10",
+}
+
+
+@pytest.mark.parametrize("which", NARROW)
+def test_a_pose_left_outside_of_the_limits_is_told_with_a_way_out(which: str) -> None:
+    """The board refused enable() with out_of_limits, whatever the user tried after it."""
+    left_mm = (15.0, 0.0, 60.0) if which.startswith("Tendons") else (0.0, 0.0, 45.0)
+    with compressed() as made:
+        made.robot.move_to(left_mm)
+        made.robot.limp()
+        left = made.robot.telemetry.pulse_ticks
+        narrow = loads(NARROW[which])
+        robot = Robot(made.robot.session, narrow)
+        robot.prepare()
+        with pytest.raises(UnreachableError, match=f"{which} .*accept_jump") as failure:
+            robot.enable()
+        assert "configuration" in failure.value.remedy
+        made.run(0.5)
+        assert made.world.truth().attached == (False,) * 4
+        assert robot.telemetry.pulse_ticks == left
+
+        # Servo by servo, over so far that the bristle swings: the board asks before it goes on.
+        with pytest.raises(TrippedError, match="resume"):
+            robot.enable(accept_jump=True)
+        robot.resume()
+        assert made.world.truth().attached == (True,) * 4
+        assert robot.position_mm == pytest.approx((0, 0, narrow.geometry.free_length_mm), abs=0.1)
+        robot.compress(66.0)
+
+
+def test_a_known_pose_inside_the_limits_is_kept_even_where_a_jump_is_accepted() -> None:
+    with compressed() as made:
+        made.robot.limp()
+        left = made.robot.telemetry.pulse_ticks
+        made.robot.enable(accept_jump=True)
+        assert made.robot.telemetry.pulse_ticks == left
+
+
+def test_lengths_that_one_servo_may_not_take_are_refused_before_anything_is_sent() -> None:
+    """The board refused them, and told its own ticks; the host checked pairs alone."""
+    narrow = loads(NARROW["Servo 0"])
+    with bench() as made:
+        robot = Robot(made.robot.session, narrow)
+        robot.prepare()
+        robot.enable()
+        with pytest.raises(UnreachableError, match="Servo 1"):
+            robot.move_lengths([70, 48, 70, 70])
+        assert robot.state is State.HOLDING
 
 
 def test_a_dead_line_is_told_and_the_board_plays_its_queue_to_the_end_and_holds() -> None:

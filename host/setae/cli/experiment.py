@@ -67,8 +67,8 @@ def explore(
     report
         Write the report.
     accept_jump
-        Enable the servos though nobody knows where they are: the first pulse
-        may move them at full speed.
+        Enable the servos though nobody knows where they are, or they were left where the
+        configuration doesn't allow them: the first pulse may move them at full speed.
     where
         Which robot.
     """

@@ -89,7 +89,8 @@ def move(
     relax
         Relax afterwards instead of holding.
     accept_jump
-        Enable the servos though nobody knows where they are.
+        Enable the servos though nobody knows where they are, or they were left where the
+        configuration doesn't allow them: the first pulse may move them at full speed.
     where
         Which robot.
     """
@@ -124,7 +125,8 @@ def probe(
     relax
         Relax afterwards instead of holding.
     accept_jump
-        Enable the servos though nobody knows where they are.
+        Enable the servos though nobody knows where they are, or they were left where the
+        configuration doesn't allow them: the first pulse may move them at full speed.
     where
         Which robot.
     """
@@ -165,7 +167,8 @@ def relax(*, accept_jump: Flag = False, where: Where | None = None) -> None:
     Parameters
     ----------
     accept_jump
-        Enable the servos though nobody knows where they are.
+        Enable the servos though nobody knows where they are, or they were left where the
+        configuration doesn't allow them: the first pulse may move them at full speed.
     where
         Which robot.
     """
