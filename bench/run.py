@@ -27,6 +27,8 @@ from tests.system import oracle  # noqa: E402
 from setae import rig  # noqa: E402
 from setae.config import load  # noqa: E402
 from setae.experiments.explore import Event, explore  # noqa: E402
+from setae.link.events import Event as LinkEvent  # noqa: E402
+from setae.link.events import Tripped  # noqa: E402
 from setae.scene import Obstacle, tube_scene  # noqa: E402
 from setae_protocol.messages import BOARD_OVERHEAD_BYTES, HOST_OVERHEAD_BYTES  # noqa: E402
 
@@ -197,9 +199,20 @@ def uno_query() -> Iterable[Figure]:
     )
 
 
+@dataclass(frozen=True)
+class Trial:
+    """One exploration of a random tube."""
+
+    judgement: oracle.Judgement
+    stops: int
+    stops_in_air: int
+    """Of those, with a bristle that the simulator's truth says touches nothing."""
+
+
 def random_obstacles() -> Iterable[Figure]:
     """Whether obstacles anywhere are found, and nothing else is."""
-    judged = _judged()
+    explored = _explored()
+    judged = [trial.judgement for trial in explored]
     trials = f"{RANDOM_TRIALS} simulated trials with a cube of random height, direction and size"
     yield Figure(
         "explore_false_stops",
@@ -222,13 +235,20 @@ def random_obstacles() -> Iterable[Figure]:
         f"between the two, so not judged; {sum(judgement.clear for judgement in judged)} others"
         " came out right",
     )
+    yield Figure(
+        "explore_stops_in_air",
+        sum(trial.stops_in_air for trial in explored),
+        "stops",
+        f"of all {sum(trial.stops for trial in explored)} stops in the same {RANDOM_TRIALS},"
+        " grazing ones too: the simulator's truth has the bristle touch nothing",
+    )
 
 
 @lru_cache(maxsize=1)
-def _judged() -> list[oracle.Judgement]:
+def _explored() -> list[Trial]:
     config = load()
     rng = np.random.default_rng(RANDOM_SEED)
-    judged = []
+    explored = []
     for number in range(RANDOM_TRIALS):
         cube = oracle.random_cube(rng)
         obstacle = None if cube is None else Obstacle(
@@ -237,6 +257,7 @@ def _judged() -> list[oracle.Judgement]:
         events: list[Event] = []
         scene = tube_scene(config, obstacle)
         with rig.open("sim://", config=config, seed=number, scene=scene) as opened:
+            depths_mm = _depths_at_stops(opened)
             opened.robot.enable()
             explore(opened.robot, opened.stage, on_event=events.append)
         judgement = oracle.judge(
@@ -250,8 +271,22 @@ def _judged() -> list[oracle.Judgement]:
         )
         if judgement.false_stops or judgement.missed:
             print(f"trial {number}: {cube} {judgement}", file=sys.stderr)
-        judged.append(judgement)
-    return judged
+        explored.append(Trial(judgement, len(depths_mm), sum(depth <= 0 for depth in depths_mm)))
+    return explored
+
+
+def _depths_at_stops(opened: rig.Rig) -> list[float]:
+    """Filled while the rig runs: how deep the bristle is, as each trip becomes known."""
+    depths_mm: list[float] = []
+    world = opened.world
+    assert world is not None, "a simulated rig has a world"
+
+    def look(event: LinkEvent) -> None:
+        if isinstance(event, Tripped):
+            depths_mm.append(world.truth().contact_depth_mm)
+
+    opened.robot.session.subscribe(look)
+    return depths_mm
 
 
 def kinematics_speed() -> Iterable[Figure]:
