@@ -12,7 +12,7 @@ namespace setae {
 namespace {
 
 constexpr uint32_t kClockHz = 400000;
-constexpr uint8_t kBitRate = (F_CPU / kClockHz - 16) / 2;  // data sheet section 21.5.2
+constexpr uint8_t kBitRate = (F_CPU / kClockHz - 16) / 2;  // data sheet section 22.5.2
 static_assert(F_CPU / (16 + 2UL * kBitRate) <= kClockHz, "faster than the sensor allows");
 
 // The longest transfer has 7 bytes: 0.16 ms, and other handlers' time.
@@ -88,7 +88,7 @@ Twi::Result Twi::poll() {
   return result;
 }
 
-// Data sheet section 21.7, tables 21-3 and 21-4.
+// Data sheet section 22.7.
 void Twi::advance() {
   switch (TW_STATUS) {
     case TW_START:
