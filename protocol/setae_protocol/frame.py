@@ -7,6 +7,7 @@ damaged frame is dropped and counted by its cause, never repaired.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Generic, TypeVar
@@ -111,7 +112,7 @@ def encode_board(
 FrameT = TypeVar("FrameT", HostFrame, BoardFrame)
 
 
-class Decoder(Generic[FrameT]):
+class Decoder(ABC, Generic[FrameT]):
     """Finds the frames in a stream of bytes, however it is cut into pieces.
 
     Attributes
@@ -161,8 +162,8 @@ class Decoder(Generic[FrameT]):
 
     _header_size: int
 
-    def _parse(self, body: bytes) -> FrameT | Damage:
-        raise NotImplementedError
+    @abstractmethod
+    def _parse(self, body: bytes) -> FrameT | Damage: ...
 
 
 class HostDecoder(Decoder[HostFrame]):
