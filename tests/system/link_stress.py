@@ -150,10 +150,7 @@ class Stress:
         self.world = World(seed=self.seed)
         self.world.start()
         self.witness = Witness(SimTransport(self.world))
-        faults = Faults(
-            lose=self.rate, double=self.rate, damage=self.rate, delay=self.rate,
-            split=self.rate, merge=self.rate,
-        )  # fmt: skip
+        faults = Faults.each(self.rate)
         self.line = LossyTransport(self.witness, seed=self.seed, down=faults, up=faults)
         self.session = Session(self.line, session_id=7)
         self.told: list[Refused] = []

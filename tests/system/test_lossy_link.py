@@ -30,9 +30,16 @@ START_TICKS = 1_800
 STEP_TICKS = 15
 GOOD = Faults()
 
-rates = st.sampled_from([0.0, 0.1, 0.3])
+rates = st.sampled_from([0.0, 0.05, 0.15])
 faults = st.builds(
-    Faults, lose=rates, double=rates, damage=rates, delay=rates, split=rates, merge=rates
+    Faults,
+    lose=rates,
+    double=rates,
+    damage=rates,
+    delay=rates,
+    reorder=rates,
+    split=rates,
+    merge=rates,
 )
 
 

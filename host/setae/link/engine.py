@@ -24,6 +24,7 @@ from setae.link.events import (
     LimitsRead,
     LinkFailed,
     Opened,
+    Refused,
     StateChanged,
     TelemetryReceived,
     Ticket,
@@ -251,9 +252,8 @@ class Engine:
         else:
             self.statistics.frames_received += 1
             fresh = self._arrivals.note(header.sequence, now_us)
-            if fresh:
-                self._on_header(header, now_us)
-            self._on_message(message, now_us, fresh=fresh)
+            confirmed = fresh and self._on_header(header, now_us)
+            self._on_message(message, now_us, fresh=fresh, confirmed=confirmed)
 
     def _on_hello(self, header: BoardHeader, reply: HelloReply, now_us: int) -> None:
         if self._handshake.in_session and header.session == self.session:
@@ -264,7 +264,8 @@ class Engine:
             self._reliable.board_credit = header.credit
             self.state, self.epoch = State(header.state), header.epoch
 
-    def _on_header(self, header: BoardHeader, now_us: int) -> None:
+    def _on_header(self, header: BoardHeader, now_us: int) -> bool:
+        """Return whether it confirms a command."""
         state = State(header.state)
         if (state, header.epoch) != (self.state, self.epoch):
             self._events.append(StateChanged(state, header.epoch, self.state, self.epoch, now_us))
@@ -272,20 +273,24 @@ class Engine:
             self.state, self.epoch = state, header.epoch
             if moved_on:
                 self._reliable.discard_stale(self.epoch)
-        self._reliable.on_header(header, now_us)
+        return self._reliable.on_header(header, now_us)
 
-    def _on_message(self, message: BoardMessage, now_us: int, *, fresh: bool) -> None:
+    def _on_message(
+        self, message: BoardMessage, now_us: int, *, fresh: bool, confirmed: bool
+    ) -> None:
         if isinstance(message, Telemetry):
             if fresh:
                 self._on_telemetry(message, now_us)
         elif isinstance(message, Receipt):
-            if fresh and message.gap:
-                self._reliable.on_gap(now_us)
+            if fresh and not confirmed:
+                self._reliable.on_receipt(gap=bool(message.gap), now_us=now_us)
         elif isinstance(message, (Trip, FaultMessage, RefusalMessage)):
             settling = self.phase is Phase.SETTLING
             event = self._records.receive(message, now_us, settling=settling)
             if event is not None:
                 self._events.append(event)
+                if isinstance(event, Refused) and event.ticket is not None:
+                    self._reliable.on_refusal()
         elif isinstance(message, Pong):
             self._on_pong(message, now_us)
         elif isinstance(message, Limits):

@@ -5,10 +5,14 @@ from __future__ import annotations
 import heapq
 import random
 from dataclasses import dataclass, field
+from typing import Final
 
 from setae.link.transport import Transport
 
 __all__ = ["Faults", "LossyTransport"]
+
+
+_SPLIT_PAUSE_MAX_US: Final = 2_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,10 +23,16 @@ class Faults:
     ----------
     lose, double, damage
         It is gone, comes twice, has a bit, a byte or its delimiter changed.
-    delay, delay_max_us
-        It comes late, by up to `delay_max_us`; frames after it overtake it.
-    split, merge
-        It comes in two pieces, or waits for the next.
+    delay, delay_max_us, delay_max_frames
+        It comes late: by up to `delay_max_us`, and at the latest after that many
+        frames more. Below 127 of them the protocol's numbers tell old from new.
+    reorder
+        It changes places with the next one.
+    split
+        It comes in two pieces with a pause between.
+    merge
+        It waits for the next and comes joined with it, every other time without the
+        delimiter between: then the two are one damaged frame.
     """
 
     lose: float = 0.0
@@ -30,15 +40,37 @@ class Faults:
     damage: float = 0.0
     delay: float = 0.0
     delay_max_us: int = 30_000
+    delay_max_frames: int = 100
+    reorder: float = 0.0
     split: float = 0.0
     merge: float = 0.0
+
+    @classmethod
+    def each(cls, rate: float) -> Faults:
+        """Each kind at the same rate."""
+        return cls(
+            lose=rate, double=rate, damage=rate, delay=rate, reorder=rate, split=rate, merge=rate
+        )
 
 
 @dataclass(order=True, slots=True)
 class _Piece:
     at_us: int
     number: int
+    frame: int = field(compare=False)
     data: bytes = field(compare=False)
+
+
+@dataclass(slots=True)
+class _Held:
+    """Waits for the next frame: to let it pass, or to be joined with it."""
+
+    data: bytes
+    until_us: int
+    merge: bool
+
+
+_KINDS: Final = ("lost", "doubled", "damaged", "delayed", "reordered", "split", "merged")
 
 
 class _Mangler:
@@ -47,41 +79,59 @@ class _Mangler:
     def __init__(self, faults: Faults, rng: random.Random) -> None:
         self.faults = faults
         self.pending: list[_Piece] = []
-        self.counts = dict.fromkeys(("lost", "doubled", "damaged", "delayed"), 0)
+        self.counts = dict.fromkeys(_KINDS, 0)
         self._rng = rng
         self._number = 0
+        self._frames = 0
         self._partial = b""
+        self._held: _Held | None = None
+        # The rest of a frame that was split, and what comes after it, is not there before.
+        self._not_before_us = 0
 
     def put(self, data: bytes, now_us: int) -> None:
         *frames, self._partial = (self._partial + data).split(b"\0")
         for frame in frames:
+            self._frames += 1
             self._put_frame(frame + b"\0", now_us)
+        self._hurry(now_us)
 
     def _put_frame(self, frame: bytes, now_us: int) -> None:
         faults, rng = self.faults, self._rng
-        if rng.random() < faults.lose:
-            self.counts["lost"] += 1
+        if self._happens(faults.lose, "lost"):
             return
-        copies = 1
-        if rng.random() < faults.double:
-            self.counts["doubled"] += 1
-            copies = 2
-        for _ in range(copies):
+        for _ in range(1 + self._happens(faults.double, "doubled")):
             data = frame
-            at_us = now_us
-            if rng.random() < faults.damage:
-                self.counts["damaged"] += 1
+            if self._happens(faults.damage, "damaged"):
                 data = self._damage(data)
-            if rng.random() < faults.delay:
-                self.counts["delayed"] += 1
-                at_us += rng.randint(1, faults.delay_max_us)
-            if rng.random() < faults.merge:
-                at_us += 1_000
-            if len(data) > 1 and rng.random() < faults.split:
-                cut = rng.randrange(1, len(data))
-                self._push(data[:cut], at_us)
-                data = data[cut:]
-            self._push(data, at_us)
+            if self._happens(faults.delay, "delayed"):
+                self._push(data, now_us + rng.randint(1, faults.delay_max_us))
+            elif self._held is not None:
+                held, self._held = self._held, None
+                self._send(held.data + data if held.merge else data + held.data, now_us)
+            elif self._happens(faults.reorder, "reordered"):
+                self._held = _Held(data, now_us + faults.delay_max_us, merge=False)
+            elif self._happens(faults.merge, "merged"):
+                kept = data[: len(data) - rng.randrange(2)]
+                self._held = _Held(kept, now_us + faults.delay_max_us, merge=True)
+            else:
+                self._send(data, now_us)
+
+    def _happens(self, rate: float, kind: str) -> bool:
+        if self._rng.random() >= rate:
+            return False
+        self.counts[kind] += 1
+        return True
+
+    def _send(self, data: bytes, now_us: int) -> None:
+        """In order, whole or in two pieces."""
+        at_us = max(now_us, self._not_before_us)
+        if len(data) > 1 and self._happens(self.faults.split, "split"):
+            cut = self._rng.randrange(1, len(data))
+            self._push(data[:cut], at_us)
+            data = data[cut:]
+            at_us += self._rng.randint(1, _SPLIT_PAUSE_MAX_US)
+            self._not_before_us = at_us
+        self._push(data, at_us)
 
     def _damage(self, frame: bytes) -> bytes:
         data = bytearray(frame)
@@ -99,12 +149,27 @@ class _Mangler:
 
     def _push(self, data: bytes, at_us: int) -> None:
         self._number += 1
-        heapq.heappush(self.pending, _Piece(at_us, self._number, data))
+        heapq.heappush(self.pending, _Piece(at_us, self._number, self._frames, data))
+
+    def _hurry(self, now_us: int) -> None:
+        """Nothing waits for more frames than allowed."""
+        newest = self._frames - self.faults.delay_max_frames
+        if any(piece.frame < newest for piece in self.pending):
+            for piece in self.pending:
+                if piece.frame < newest:
+                    piece.at_us = min(piece.at_us, now_us)
+            heapq.heapify(self.pending)
 
     def next_us(self) -> int | None:
-        return self.pending[0].at_us if self.pending else None
+        times = [self.pending[0].at_us] if self.pending else []
+        if self._held is not None:
+            times.append(self._held.until_us)
+        return min(times, default=None)
 
     def due(self, now_us: int) -> bytes:
+        if self._held is not None and self._held.until_us <= now_us:
+            held, self._held = self._held, None
+            self._send(held.data, now_us)
         out = b""
         while self.pending and self.pending[0].at_us <= now_us:
             out += heapq.heappop(self.pending).data
@@ -171,7 +236,7 @@ class LossyTransport:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Frames lost, doubled, damaged and delayed so far, both ways."""
+        """How many frames of each kind of harm so far, both ways."""
         return {key: value + self._up.counts[key] for key, value in self._down.counts.items()}
 
     def now_us(self) -> int:

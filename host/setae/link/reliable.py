@@ -68,6 +68,7 @@ class ReliableSender:
         self._tries = 0
         self._timeout_at_us = 0
         self._resent_at_us: int | None = None
+        self._refused = False
 
     @property
     def credit(self) -> int:
@@ -138,18 +139,24 @@ class ReliableSender:
             self._transmit(item)
             self._statistics.frames_retransmitted += 1
         self._resent_at_us = now_us
+        self._refused = False
         self._timeout_at_us = now_us + self.timer.timeout_us
 
     # ------------------------------------------------------------------------ receiving
 
-    def on_header(self, header: BoardHeader, now_us: int) -> None:
-        """Take room and acknowledgement from a board frame that is newer than all before."""
+    def on_header(self, header: BoardHeader, now_us: int) -> bool:
+        """Take room and acknowledgement from a board frame that is newer than all before.
+
+        Returns
+        -------
+        Whether it confirms a command.
+        """
         self.board_credit = header.credit
         if not self._flight:
-            return
+            return False
         confirmed = (header.expected - self._flight[0].sequence) & 0xFF
         if not 0 < confirmed <= len(self._flight):
-            return
+            return False
         for _ in range(confirmed):
             item = self._flight.popleft()
             self._verdicts.acknowledged(
@@ -160,13 +167,23 @@ class ReliableSender:
         self._tries = 0
         self.timer.recover()
         self._timeout_at_us = now_us + self.timer.timeout_us
+        return True
 
-    def on_gap(self, now_us: int) -> None:
-        """The board says that a command is missing: send again, once per round trip."""
-        if not self._flight:
+    def on_refusal(self) -> None:
+        """A refusal was told: until its acknowledgement arrives the board takes no second one."""
+        self._refused = bool(self._flight)
+
+    def on_receipt(self, *, gap: bool, now_us: int) -> None:
+        """Send again what the board did not take.
+
+        With `gap` it says that a command is missing. Without, and after a refusal, it
+        may have held one back that it would have to refuse too. Either once per round
+        trip, but for the first after a refusal: its acknowledgement went out meanwhile.
+        """
+        if not self._flight or not (gap or self._refused):
             return
         since = self._resent_at_us
-        if since is None or now_us - since >= self.timer.round_trip_us:
+        if since is None or self._refused or now_us - since >= self.timer.round_trip_us:
             self._retransmit(now_us)
 
     # ---------------------------------------------------------------------------- ends

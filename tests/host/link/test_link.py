@@ -337,7 +337,14 @@ def test_long_gap_in_telemetry_does_not_make_new_frames_old(
 
 rates = st.sampled_from([0.0, 0.05, 0.2, 0.4])
 faults = st.builds(
-    Faults, lose=rates, double=rates, damage=rates, delay=rates, split=rates, merge=rates
+    Faults,
+    lose=rates,
+    double=rates,
+    damage=rates,
+    delay=rates,
+    reorder=rates,
+    split=rates,
+    merge=rates,
 )
 steps = st.lists(
     st.one_of(
@@ -446,7 +453,7 @@ def test_session_opens_over_a_bad_line(down: Faults, up: Faults, seed: int) -> N
 def test_same_seed_same_bytes() -> None:
     def run() -> list[bytes]:
         line = ModelTransport()
-        bad = Faults(lose=0.2, double=0.2, damage=0.2, delay=0.2, split=0.2, merge=0.2)
+        bad = Faults.each(0.2)
         session = Session(LossyTransport(line, seed=5, down=bad, up=bad), session_id=7)
         session.open(timeout_us=60 * SECOND_US)
         ticket = session.send(Enable(pulse_ticks=POSE))

@@ -219,3 +219,19 @@ def test_256_lost_frames_are_a_loss(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(line.board, "say", say)
     session.run_until(lambda: ticket.done, SECOND_US)
     assert ticket.state is TicketState.REFUSED
+
+
+def test_refusals_in_a_row_cost_no_timeout() -> None:
+    """The board takes no second refusal before the host has the first one's record.
+
+    It dropped the next command until then, and did not say so: each of several in
+    a row waited for a timeout of 25 ms or more.
+    """
+    line = ModelTransport()
+    session = Session(line, session_id=7)
+    session.open()
+    wrong = Resume(epoch=session.epoch + 1)
+    tickets = [session.send(wrong) for _ in range(2)]
+    session.run_until(lambda: all(ticket.done for ticket in tickets), SECOND_US)
+    assert [ticket.state for ticket in tickets] == [TicketState.REFUSED] * 2
+    assert session.engine.statistics.timeouts == 0
