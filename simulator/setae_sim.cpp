@@ -1,5 +1,6 @@
 #include "setae_sim.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <exception>
@@ -16,6 +17,7 @@
 #endif
 
 using setae::sim::Environment;
+using setae::sim::Mat3;
 using setae::sim::Parameters;
 using setae::sim::Truth;
 using setae::sim::Vec3;
@@ -25,7 +27,8 @@ struct setae_world {
   uint64_t seed;
   Parameters parameters;
   Environment environment;
-  std::unique_ptr<World> world;  // from the start on
+  setae::sim::ForeignPlant foreign;  // empty: the built-in spring
+  std::unique_ptr<World> world;      // from the start on
   std::string error;
 };
 
@@ -35,6 +38,7 @@ constexpr int kBadArgument = -1;
 constexpr int kWrongTime = -2;
 constexpr int kNoSolution = -3;
 constexpr int kInternal = -4;
+constexpr int kForeignPlant = -5;
 
 int fail(setae_world* world, int code, const std::string& text) {
   world->error = text;
@@ -73,6 +77,41 @@ void write(const Vec3& from, double* out) {
   out[2] = from.z;
 }
 
+void write(const Mat3& from, double* out) {  // row major
+  const double rows[9] = {from.ex.x, from.ey.x, from.ez.x, from.ex.y, from.ey.y,
+                          from.ez.y, from.ex.z, from.ey.z, from.ez.z};
+  std::memcpy(out, rows, sizeof rows);
+}
+
+Mat3 matrix(const double (&rows)[9]) {
+  return {{rows[0], rows[3], rows[6]}, {rows[1], rows[4], rows[7]}, {rows[2], rows[5], rows[8]}};
+}
+
+// The centre line of a plant that tells its top only: the cubic from D to U with
+// the directions of both ends. For pictures.
+void write_cubic(const setae::sim::Top& top, double (*out)[3]) {
+  const double reach = norm(top.position_mm);
+  const Vec3 leave = {0, 0, reach}, arrive = reach * top.rotation.ez;
+  for (int j = 0; j < SETAE_BACKBONE_POINTS; ++j) {
+    const double u = static_cast<double>(j) / (SETAE_BACKBONE_POINTS - 1);
+    write((u * u * (3 - 2 * u)) * top.position_mm + (u * (1 - u) * (1 - u)) * leave +
+              (u * u * (u - 1)) * arrive,
+          out[j]);
+  }
+}
+
+int outcome(setae_world* world, setae::sim::Outcome what, const char* no_solution) {
+  switch (what) {
+    case setae::sim::Outcome::kNoSolution:
+      return fail(world, kNoSolution, no_solution);
+    case setae::sim::Outcome::kForeignFailed:
+      return fail(world, kForeignPlant, "the plant that was plugged in failed");
+    case setae::sim::Outcome::kFine:
+      break;
+  }
+  return 0;
+}
+
 constexpr const char* kNotStarted = "the world has not been started";
 constexpr const char* kStarted = "the world has been started already";
 
@@ -80,7 +119,7 @@ constexpr const char* kStarted = "the world has been started already";
 
 SETAE_EXPORT setae_world* setae_world_create(uint64_t seed) {
   try {
-    return new setae_world{seed, setae::sim::default_parameters(), {}, nullptr, {}};
+    return new setae_world{seed, setae::sim::default_parameters(), {}, {}, nullptr, {}};
   } catch (const std::exception&) {
     return nullptr;
   }
@@ -122,6 +161,34 @@ SETAE_EXPORT int setae_world_get(const setae_world* world, const char* name, dou
     return setae::sim::get_parameter(world->parameters, name, *value, mutable_world->error)
                ? 0
                : kBadArgument;
+  });
+}
+
+SETAE_EXPORT int setae_world_use_plant(setae_world* world, setae_plant_step step, void* user) {
+  if (world->world)
+    return fail(world, kWrongTime, kStarted);
+  if (step == nullptr)
+    return fail(world, kBadArgument, "a plant needs a function that steps it");
+  return guarded(world, [&] {
+    world->foreign = [step, user](const setae::sim::Drive& drive, setae::sim::Answer& answer) {
+      setae_plant_input in{};
+      in.time_us = drive.time_us;
+      in.attached = static_cast<int32_t>(drive.attached);
+      std::copy(drive.pulse_us.begin(), drive.pulse_us.end(), in.pulse_us);
+      std::copy(drive.pull_mm.begin(), drive.pull_mm.end(), in.pull_mm);
+      setae_plant_output out{};
+      out.pressure_hpa = std::nan("");
+      if (step(user, &in, &out) != 0)
+        return false;
+      Vec3 position;
+      if (!read(out.position_mm, position))
+        return false;
+      answer.top = {position, matrix(out.rotation), {}};
+      std::copy(out.tension_n, out.tension_n + SETAE_TENDONS, answer.top.tension_n.begin());
+      answer.pressure_hpa = out.pressure_hpa;
+      return true;
+    };
+    return 0;
   });
 }
 
@@ -172,12 +239,13 @@ SETAE_EXPORT int setae_world_start(setae_world* world, const double arm_mm[3]) {
   return guarded(world, [&] {
     if (!setae::sim::check_parameters(world->parameters, world->error))
       return kBadArgument;
-    auto started = std::make_unique<World>(world->parameters, world->environment, world->seed, arm);
-    if (!started->solved()) {
-      return fail(world, kNoSolution, "the spring has no equilibrium with these parameters");
-    }
-    world->world = std::move(started);
-    return 0;
+    auto started = std::make_unique<World>(world->parameters, world->environment, world->seed, arm,
+                                           world->foreign);
+    const int status =
+        outcome(world, started->outcome(), "the spring has no equilibrium with these parameters");
+    if (status == 0)
+      world->world = std::move(started);
+    return status;
   });
 }
 
@@ -206,12 +274,12 @@ SETAE_EXPORT int setae_world_run(setae_world* world, int64_t until_us, uint8_t* 
   const size_t room = *size;
   *size = 0;
   return guarded(world, [&] {
-    if (!world->world->run(until_us)) {
-      return fail(world, kNoSolution,
-                  "the spring's equilibrium could not be found for several samples in a row");
-    }
-    *size = world->world->read(data, room);
-    return 0;
+    const int status =
+        outcome(world, world->world->run(until_us),
+                "the spring's equilibrium could not be found for several samples in a row");
+    if (status == 0)
+      *size = world->world->read(data, room);
+    return status;
   });
 }
 
@@ -267,26 +335,27 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
             static_cast<double>(w.hal().output().ticks[i]) / setae::protocol::kPulseTicksPerUs;
       }
       out->servo_length_mm[i] = truth.body.servos[i].length_mm();
-      out->tension_n[i] = plant.tension_n()[i];
+      out->tension_n[i] = truth.top.tension_n[i];
     }
     static_assert(SETAE_BACKBONE_POINTS == 2 * setae::sim::kElements + 1,
                   "the backbone's points are stations and midpoints");
-    for (int j = 0; j < setae::sim::kStations; ++j) {
-      write(shape.position[j], out->backbone_mm[2 * j]);
-      if (j < setae::sim::kElements) {
-        write(plant.rod().midpoint(shape, j), out->backbone_mm[2 * j + 1]);
+    if (w.foreign()) {
+      write_cubic(truth.top, out->backbone_mm);
+    } else {
+      for (int j = 0; j < setae::sim::kStations; ++j) {
+        write(shape.position[j], out->backbone_mm[2 * j]);
+        if (j < setae::sim::kElements) {
+          write(plant.rod().midpoint(shape, j), out->backbone_mm[2 * j + 1]);
+        }
       }
     }
-    const setae::sim::Mat3& top = shape.rotation[setae::sim::kElements];
-    const double rotation[9] = {top.ex.x, top.ey.x, top.ez.x, top.ex.y, top.ey.y,
-                                top.ez.y, top.ex.z, top.ey.z, top.ez.z};
-    std::memcpy(out->rotation, rotation, sizeof rotation);
+    write(truth.top.rotation, out->rotation);
     write(truth.root_mm, out->filament_mm[0]);
     write(truth.tip_mm, out->filament_mm[1]);
     out->contact_depth_mm = truth.contact.depth_mm;
     write(truth.contact.point_mm, out->contact_point_mm);
     out->pressure_hpa = w.pressure_hpa();
-    out->plant_residual = plant.residual();
+    out->plant_residual = w.foreign() ? 0 : plant.residual();
     return 0;
   });
 }

@@ -50,6 +50,28 @@ const char* setae_world_parameter_name(int index);
 int setae_world_set(setae_world*, const char* name, double value);
 int setae_world_get(const setae_world*, const char* name, double* value);
 
+/* Another plant in the place of the built-in spring; before the start only. It is
+ * asked at the start and at each of the sensor's samples, with time never going
+ * back, and its answer holds until the next. It returns 0, or anything else to end
+ * the run. `user` is handed through. Bristle, sensor, arm and solids stay the
+ * world's own. */
+typedef struct {
+  int64_t time_us;
+  int32_t attached;               /* bit i: servo i has pulses */
+  double pulse_us[SETAE_TENDONS]; /* what the board puts out; 0 where detached */
+  double pull_mm[SETAE_TENDONS];  /* what the world's own servos have wound up by now */
+} setae_plant_input;
+
+typedef struct {
+  double position_mm[3]; /* of the spring's top U in frame D */
+  double rotation[9];    /* D to U, row major */
+  double tension_n[SETAE_TENDONS];
+  double pressure_hpa; /* against rest, drift and noise included; NaN: the world's own bristle */
+} setae_plant_output;
+
+typedef int (*setae_plant_step)(void* user, const setae_plant_input*, setae_plant_output*);
+int setae_world_use_plant(setae_world*, setae_plant_step step, void* user);
+
 /* Solids that the bristle can touch, in the world; before the start only. */
 int setae_world_add_tube(setae_world*, const double axis_point_mm[3], double inner_radius_mm);
 /* Box: centre, edge lengths, turned by yaw about the world's z axis. */

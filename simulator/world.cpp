@@ -88,24 +88,26 @@ int64_t sample_time_us(const Parameters& p, int64_t number) {
 }  // namespace
 
 World::World(const Parameters& parameters, const Environment& environment, uint64_t seed,
-             const Vec3& arm_mm)
+             const Vec3& arm_mm, ForeignPlant foreign)
     : parameters_(parameters),
       environment_(environment),
       clock_error_ppb_(std::llround(1000 * parameters.board.clock_rate_ppm)),
       line_(line_settings(parameters)),
       body_(make_body(parameters)),
+      foreign_(std::move(foreign)),
       bristle_(bristle_settings(parameters), seed),
       next_sample_us_(sample_time_us(parameters, 1)) {
   arm_.place(arm_mm);
+  ask_foreign();
   Vec3 root_mm, tip_mm;
-  filament(body_, root_mm, tip_mm);
+  filament(top(body_), root_mm, tip_mm);
   bristle_.place(in_world(root_mm));
   if (parameters.board.pose_known == 0)
     hal_.forget_pose();
   boot();
 }
 
-bool World::run(int64_t until_us) {
+Outcome World::run(int64_t until_us) {
   while (!line_.host_has_bytes() && now_us_ < until_us) {
     // The board runs at events only, so that nothing depends on how a caller
     // slices the time.
@@ -113,10 +115,16 @@ bool World::run(int64_t until_us) {
     now_us_ = std::min(next_us, until_us);
     if (next_us <= now_us_)
       handle_events();
-    if (unsolved_ >= kUnsolvedMost)
-      return false;
+    if (outcome() == Outcome::kForeignFailed || unsolved_ >= kUnsolvedMost)
+      return outcome();
   }
-  return true;
+  return Outcome::kFine;
+}
+
+Outcome World::outcome() const {
+  if (foreign_)
+    return foreign_failed_ ? Outcome::kForeignFailed : Outcome::kFine;
+  return body_.plant.solved() ? Outcome::kFine : Outcome::kNoSolution;
 }
 
 int64_t World::next_event_us() const {
@@ -230,13 +238,15 @@ bool World::sample() {
     return false;
   const int64_t duration_us = now_us_ - last_sample_us_;
   move(body_, duration_us);
-  unsolved_ = body_.plant.solved() ? 0 : unsolved_ + 1;
+  ask_foreign();
+  unsolved_ = outcome() == Outcome::kFine ? 0 : unsolved_ + 1;
+  const Top now = top(body_);
   Vec3 root_mm, tip_mm;
-  filament(body_, root_mm, tip_mm);
+  filament(now, root_mm, tip_mm);
   const Vec3 root = in_world(root_mm), tip = in_world(tip_mm);
   const Contact contact = environment_.deepest(root, tip);
-  bristle_.step(1e-6 * static_cast<double>(duration_us), root,
-                flip(body_.plant.shape().rotation[kElements].ez), contact.depth_mm);
+  bristle_.step(1e-6 * static_cast<double>(duration_us), root, flip(now.rotation.ez),
+                contact.depth_mm);
   last_sample_us_ = now_us_;
   ++samples_;
   next_sample_us_ = sample_time_us(parameters_, samples_ + 1);
@@ -270,7 +280,7 @@ void World::move(Body& body, int64_t duration_us) const {
     body.servos[i].advance_to(now_us_);
     lengths_mm[i] = body.servos[i].length_mm();
   }
-  if (duration_us <= 0)
+  if (duration_us <= 0 || foreign_)
     return;
   if (lengths_mm == body.plant.lengths_mm() && !body.plant.creeping() && body.plant.solved()) {
     return;
@@ -278,18 +288,47 @@ void World::move(Body& body, int64_t duration_us) const {
   body.plant.step(lengths_mm, 1e-6 * static_cast<double>(duration_us));
 }
 
-void World::filament(const Body& body, Vec3& root_mm, Vec3& tip_mm) const {
-  const Vec3 top_mm = body.plant.shape().position[kElements];
-  const Vec3 axis = body.plant.shape().rotation[kElements].ez;
+void World::ask_foreign() {
+  if (!foreign_)
+    return;
+  Drive drive{now_us_, hal_.attached(), {}, {}};
+  for (int i = 0; i < kTendons; ++i) {
+    drive.pulse_us[i] = pulse_us(i);
+    drive.pull_mm[i] = parameters_.spring.free_length_mm - body_.servos[i].length_mm();
+  }
+  foreign_failed_ = !foreign_(drive, answer_);
+}
+
+double World::pulse_us(int tendon) const {
+  if ((hal_.attached() >> tendon & 1) == 0)
+    return 0;
+  return static_cast<double>(hal_.output().ticks[tendon]) / protocol::kPulseTicksPerUs;
+}
+
+double World::pressure_hpa() const {
+  const bool theirs = foreign_ && std::isfinite(answer_.pressure_hpa);
+  return parameters_.sensor.ambient_hpa + (theirs ? answer_.pressure_hpa : bristle_.pressure_hpa());
+}
+
+Top World::top(const Body& body) const {
+  if (foreign_)
+    return answer_.top;
+  const Shape& shape = body.plant.shape();
+  return {shape.position[kElements], shape.rotation[kElements], body.plant.tension_n()};
+}
+
+void World::filament(const Top& top, Vec3& root_mm, Vec3& tip_mm) const {
   const double tip_offset_mm = parameters_.bristle.tip_offset_mm;
-  root_mm = top_mm + (tip_offset_mm - parameters_.bristle.filament_length_mm) * axis;
-  tip_mm = top_mm + tip_offset_mm * axis;
+  root_mm =
+      top.position_mm + (tip_offset_mm - parameters_.bristle.filament_length_mm) * top.rotation.ez;
+  tip_mm = top.position_mm + tip_offset_mm * top.rotation.ez;
 }
 
 Truth World::truth() const {
-  Truth truth{body_, {}, {}, {}};
+  Truth truth{body_, {}, {}, {}, {}};
   move(truth.body, now_us_ - last_sample_us_);
-  filament(truth.body, truth.root_mm, truth.tip_mm);
+  truth.top = top(truth.body);
+  filament(truth.top, truth.root_mm, truth.tip_mm);
   truth.contact = environment_.deepest(in_world(truth.root_mm), in_world(truth.tip_mm));
   return truth;
 }

@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,34 +32,59 @@ struct Body {
   Plant plant;
 };
 
+// Where the spring's top is, and what pulls it.
+struct Top {
+  Vec3 position_mm;
+  Mat3 rotation;
+  std::array<double, kTendons> tension_n;
+};
+
+// Another plant in the place of the spring: asked at every sample for the answer to
+// what the servos do. Not a finite pressure: the world's own bristle says it.
+struct Drive {
+  int64_t time_us;
+  unsigned attached;
+  std::array<double, kTendons> pulse_us, pull_mm;
+};
+struct Answer {
+  Top top;
+  double pressure_hpa;
+};
+using ForeignPlant = std::function<bool(const Drive&, Answer&)>;
+
+enum class Outcome { kFine, kNoSolution, kForeignFailed };
+
 struct Truth {
   Body body;
+  Top top;
   Vec3 root_mm, tip_mm;  // of the filament, frame D
   Contact contact;       // in the world
 };
 
 class World {
  public:
+  // `foreign` may be empty: then the spring is the plant.
   World(const Parameters& parameters, const Environment& environment, uint64_t seed,
-        const Vec3& arm_mm);
+        const Vec3& arm_mm, ForeignPlant foreign);
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
   int64_t now_us() const { return now_us_; }
   void send(const uint8_t* data, size_t size) { line_.send(now_us_, data, size); }
 
-  // Steps until the host can read bytes, or the time has come. False where the
-  // plant has no solution any more.
-  bool run(int64_t until_us);
+  // Steps until the host can read bytes, or the time has come.
+  Outcome run(int64_t until_us);
   size_t read(uint8_t* data, size_t room) { return line_.read(data, room); }
 
   Arm& arm() { return arm_; }
   const Arm& arm() const { return arm_; }
   const HostHal& hal() const { return hal_; }
-  double pressure_hpa() const { return parameters_.sensor.ambient_hpa + bristle_.pressure_hpa(); }
+  double pressure_hpa() const;
 
   Truth truth() const;
-  bool solved() const { return body_.plant.solved(); }
+  bool foreign() const { return static_cast<bool>(foreign_); }
+  // Of the first equilibrium, right after it was made.
+  Outcome outcome() const;
 
   void set_sensor_fault(SensorFault fault) { sensor_fault_ = fault; }
   void reset_board();
@@ -74,7 +100,10 @@ class World {
   bool sample();
   void move(Body& body, int64_t duration_us) const;
   void transmit();
-  void filament(const Body& body, Vec3& root_mm, Vec3& tip_mm) const;
+  void ask_foreign();
+  Top top(const Body& body) const;
+  double pulse_us(int tendon) const;
+  void filament(const Top& top, Vec3& root_mm, Vec3& tip_mm) const;
   Vec3 in_world(const Vec3& point_mm) const { return arm_.position_mm(now_us_) + flip(point_mm); }
 
   const Parameters parameters_;
@@ -92,6 +121,9 @@ class World {
   Line line_;
   Arm arm_;
   Body body_;
+  ForeignPlant foreign_;
+  Answer answer_{};
+  bool foreign_failed_ = false;
   Bristle bristle_;
   SensorFault sensor_fault_ = SensorFault::kNone;
   int64_t samples_ = 0;

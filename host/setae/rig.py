@@ -29,7 +29,7 @@ from setae.link.transport import Transport
 from setae.record import Recorder
 from setae.robot import Robot
 from setae.scene import Scene, tube_scene
-from setae.sim import SimTransport, SimulatedStage, World
+from setae.sim import SimTransport, SimulatedStage, World, plants, plugin
 from setae.stage import ManualStage, Stage
 from setae_protocol.messages import (
     PRESSURE_LSB_PER_HPA,
@@ -40,7 +40,7 @@ from setae_protocol.messages import (
     TripCause,
 )
 
-__all__ = ["Leave", "PortInfo", "Rig", "connect", "find_port", "open", "ports"]
+__all__ = ["Leave", "PortInfo", "Rig", "connect", "find_port", "open", "plants", "ports"]
 
 Leave: TypeAlias = Literal["relax", "hold"]
 
@@ -131,8 +131,9 @@ def connect(
     Parameters
     ----------
     url
-        ``sim://`` for the simulator, a serial port such as ``/dev/ttyACM0``, or
-        None to find the board by its USB ids.
+        ``sim://`` for the simulator, ``python:module:factory`` for the simulator with
+        another plant (`setae.sim.plugin`), a serial port such as ``/dev/ttyACM0``,
+        or None to find the board by its USB ids.
     config
         The robot; None: the paper's.
     seed
@@ -193,11 +194,10 @@ def open(  # noqa: A001  # rig.open() is what it does
     """
     config = config or load()
     scene = scene or tube_scene(config)
-    scheme = urlsplit(url).scheme if url and "://" in url else ""
-    if scheme == "sim":
-        assert url is not None
-        seed = _seed(url, seed)
-        world = _world(config, scene, seed)
+    if url is not None and url.startswith(("sim://", plugin.PREFIX)):
+        foreign = url if url.startswith(plugin.PREFIX) else None
+        seed = seed if foreign else _seed(url, seed)
+        world = _world(config, scene, seed, foreign)
         transport: Transport = SimTransport(world)
         stage = stage or SimulatedStage(world, config.stage)
         session_id: int | None = seed % 255 + 1
@@ -214,7 +214,14 @@ def open(  # noqa: A001  # rig.open() is what it does
     except BaseException:
         session.close()
         raise
-    return Rig(robot, stage, scene, seed if world is not None else None, world)
+    if world is None:
+        return Rig(robot, stage, scene, None, None)
+    return Rig(robot, stage, scene, seed, world, foreign or plants.resolve(config.plant, seed))
+
+
+def _parameters(config: Config, seed: int) -> dict[str, float]:
+    """The named plant's, and what the configuration says itself above them."""
+    return {**plants.parameters(config.plant, seed), **dict(config.simulator)}
 
 
 def _seed(url: str, seed: int) -> int:
@@ -229,8 +236,12 @@ def _seed(url: str, seed: int) -> int:
     return number
 
 
-def _world(config: Config, scene: Scene, seed: int) -> World:
-    world = World(seed=seed, parameters=dict(config.simulator))
+def _world(config: Config, scene: Scene, seed: int, foreign: str | None = None) -> World:
+    world = World(
+        seed=seed,
+        parameters=_parameters(config, seed),
+        plant=plugin.make(foreign, config, seed) if foreign else None,
+    )
     world.add_tube(scene.tube_axis_mm, scene.tube_inner_radius_mm)
     if scene.box is not None:
         world.add_box(scene.box.centre_mm, scene.box.edges_mm, scene.box.yaw_rad)
@@ -265,17 +276,26 @@ class Rig:
     scene : Scene
     seed : int or None
         Of the simulator; None for a real robot.
+    plant : str or None
+        Name of the simulated robot, or the plug-in's; None for a real robot.
     world : World or None
         The simulated world, to look at its truth; None for a real robot.
     """
 
     def __init__(
-        self, robot: Robot, stage: Stage, scene: Scene, seed: int | None, world: World | None
+        self,
+        robot: Robot,
+        stage: Stage,
+        scene: Scene,
+        seed: int | None,
+        world: World | None,
+        plant: str | None = None,
     ) -> None:
         self.robot = robot
         self.stage = stage
         self.scene = scene
         self.seed = seed
+        self.plant = plant
         self.world = world
         self._log: _Log | None = None
 
@@ -339,6 +359,10 @@ class Rig:
         return {
             "simulated": self.world is not None,
             "seed": self.seed,
+            "plant": self.plant,
+            "plant_parameters": None
+            if self.seed is None
+            else _parameters(self.robot.config, self.seed),
             "config": self.robot.config.to_toml(),
             "versions": {
                 "setae": setae.__version__,

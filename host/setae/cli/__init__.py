@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from cyclopts import CycloptsError
 
 from setae.cli import experiment, firmware, logs, robot, workspace
-from setae.cli.common import app
+from setae.cli.common import app, with_plugin
 from setae.errors import SetaeError
 
 __all__ = ["app", "main"]
@@ -30,7 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     of the wrong kind. 130: ended by Ctrl-C.
     """
     try:
-        code = app(arguments, exit_on_error=False, print_error=False)
+        given = sys.argv[1:] if arguments is None else arguments
+        code = app(with_plugin(given), exit_on_error=False, print_error=False)
     except SetaeError as error:
         _tell(" ".join([str(error), *getattr(error, "__notes__", [])]))
         sys.exit(1)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,11 @@ class Where:
     Parameters
     ----------
     sim
-        Use the simulator.
+        Use the simulator. `--sim python:module:factory` puts another plant into it.
+    plugin
+        The same as `--sim python:module:factory`.
+    plant
+        The simulated robot: ideal, paper_like or random:SEED.
     port
         Serial port of the board, such as /dev/ttyACM0. Without it the board is
         found by its USB ids.
@@ -46,6 +51,8 @@ class Where:
     """
 
     sim: Annotated[bool, Parameter(negative="")] = False
+    plugin: str | None = None
+    plant: str | None = None
     port: str | None = None
     config: Path | None = None
     seed: int = 0
@@ -53,20 +60,39 @@ class Where:
     @property
     def url(self) -> str | None:
         """For `setae.rig.connect` and `setae.rig.open`."""
-        if self.sim and self.port is not None:
+        if self.simulated and self.port is not None:
             raise InputError("--sim and --port exclude each other.", "Give one of them.")
+        if self.plant is not None and not self.simulated:
+            raise InputError("--plant names a simulated robot.", "Give --sim too.")
         if self.seed < 0:
             raise InputError(f"--seed is {self.seed}.", "Give 0 or more.")
-        return "sim://" if self.sim else self.port
+        return self.plugin or ("sim://" if self.sim else self.port)
 
     @property
     def simulated(self) -> bool:
         """Whether the robot is the simulated one."""
-        return self.url == "sim://"
+        return self.sim or self.plugin is not None
 
     def load(self) -> Config:
         """The configuration."""
-        return load(self.config)
+        config = load(self.config)
+        return config if self.plant is None else dataclasses.replace(config, plant=self.plant)
+
+
+def with_plugin(arguments: Sequence[str]) -> list[str]:
+    """Arguments with `--sim python:...` written as `--sim --plugin python:...`.
+
+    `--sim` takes no value, otherwise `--sim 15 0 60` could not be told apart.
+    """
+    result: list[str] = []
+    for argument in arguments:
+        if argument.startswith("--sim=python:"):
+            result += ["--sim", "--plugin", argument.removeprefix("--sim=")]
+        elif argument.startswith("python:") and result and result[-1] == "--sim":
+            result += ["--plugin", argument]
+        else:
+            result.append(argument)
+    return result
 
 
 def new_folder(name: str, out: Path | None, *, force: bool) -> Path:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from setae.config.keys import keys
-from setae.config.sections import SECTIONS, Config
+from setae.config.sections import DEFAULT_PLANT, PLANT_KEY, SECTIONS, Config
 from setae.errors import ConfigError
 
 
@@ -84,9 +84,10 @@ def loads(text: str, *, source: str = "configuration") -> Config:
             sections[name] = section(**values)
         except ConfigError as error:
             raise ConfigError(f"{source}: {error.problem}") from None
+    plant = theirs.get("simulator", {}).pop(PLANT_KEY, DEFAULT_PLANT)
     parameters = {**paper.get("simulator", {}), **theirs.get("simulator", {})}
     try:
-        return Config(**sections, simulator=tuple(sorted(parameters.items())))
+        return Config(**sections, simulator=tuple(sorted(parameters.items())), plant=plant)
     except ConfigError as error:
         raise ConfigError(f"{source}: {error.problem}", error.remedy) from None
 
@@ -106,13 +107,27 @@ def _parse(text: str, source: str) -> dict[str, dict[str, Any]]:
                 f"Put it below one of: {', '.join(f'[{section}]' for section in known)}.",
             )
         if name == "simulator":
-            result[name] = dict(_flatten(table, source))
+            result[name] = _parse_simulator(table, source)
         elif name in SECTIONS:
             result[name] = _parse_section(name, table, source)
         else:
             raise ConfigError(
                 f"{source}: there is no section [{name}].", _suggest(name, known, "[{}]")
             )
+    return result
+
+
+def _parse_simulator(table: Mapping[str, Any], source: str) -> dict[str, Any]:
+    numbers = {name: value for name, value in table.items() if name != PLANT_KEY}
+    result: dict[str, Any] = dict(_flatten(numbers, source))
+    if PLANT_KEY in table:
+        plant = table[PLANT_KEY]
+        if not isinstance(plant, str):
+            raise ConfigError(
+                f"{source}: [simulator] {PLANT_KEY} = {_show(plant)}: it must be a text.",
+                'Such as "ideal".',
+            )
+        result[PLANT_KEY] = plant
     return result
 
 

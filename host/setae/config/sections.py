@@ -12,6 +12,11 @@ from setae.errors import ConfigError
 SERVOS = 4
 """How many the board drives."""
 
+PLANT_KEY = "plant_name"
+"""Key in ``[simulator]`` that names the simulated robot; all its others are numbers."""
+
+DEFAULT_PLANT = "ideal"
+
 TENDON_MODELS = ("paper", "parallel", "taut")
 """Names that the key ``model`` may have; `setae.tendons` has a function for each."""
 
@@ -243,7 +248,10 @@ class Config:
     geometry, spring, servo, motion, bristle, stage, explore, tube
         The sections.
     simulator
-        Parameters of the simulator, (its own name, value), sorted by name.
+        Parameters of the simulator, (its own name, value), sorted by name; they stand
+        above the plant's.
+    plant
+        Name of the simulated robot: ``plant_name`` in ``[simulator]``.
 
     Examples
     --------
@@ -261,6 +269,7 @@ class Config:
     explore: Explore
     tube: Tube
     simulator: tuple[tuple[str, float], ...] = ()
+    plant: str = DEFAULT_PLANT
 
     def __post_init__(self) -> None:
         count = self.geometry.tendon_count
@@ -294,6 +303,6 @@ class Config:
         lines: list[str] = []
         for name in SECTIONS:
             lines += [f"[{name}]", *toml_lines(getattr(self, name)), ""]
-        lines.append("[simulator]")
+        lines += ["[simulator]", f"{PLANT_KEY} = {json.dumps(self.plant)}"]
         lines.extend(f"{json.dumps(name)} = {value!r}" for name, value in self.simulator)
         return "\n".join(lines) + "\n"

@@ -6,12 +6,15 @@ solids; `SimTransport` and `SimulatedStage` are the two ways into it that look
 like hardware to the rest of setae.
 """
 
+from setae.sim import plants, plugin
 from setae.sim.library import SimulationError
+from setae.sim.plugin import PluginError
 from setae.sim.stage import SimulatedStage
 from setae.sim.transport import SimTransport
 from setae.sim.world import SensorFault, Truth, World, parameter_names
 
 __all__ = [
+    "PluginError",
     "SensorFault",
     "SimTransport",
     "SimulatedStage",
@@ -19,4 +22,6 @@ __all__ = [
     "Truth",
     "World",
     "parameter_names",
+    "plants",
+    "plugin",
 ]

@@ -6,12 +6,31 @@ import ctypes
 import functools
 import importlib.util
 import os
-from ctypes import POINTER, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint64
+from ctypes import (
+    POINTER,
+    c_char_p,
+    c_double,
+    c_int,
+    c_int32,
+    c_int64,
+    c_size_t,
+    c_uint64,
+    c_void_p,
+)
 from pathlib import Path
 
 from setae.errors import SetaeError, SimulatorMissingError
 
-__all__ = ["BACKBONE_POINTS", "TENDONS", "CTruth", "SimulationError", "load"]
+__all__ = [
+    "BACKBONE_POINTS",
+    "TENDONS",
+    "CPlantInput",
+    "CPlantOutput",
+    "CTruth",
+    "PlantStep",
+    "SimulationError",
+    "load",
+]
 
 BACKBONE_POINTS = 21
 TENDONS = 4
@@ -50,6 +69,32 @@ class CTruth(ctypes.Structure):
         ("pressure_hpa", c_double),
         ("plant_residual", c_double),
     )
+
+
+class CPlantInput(ctypes.Structure):
+    """`setae_plant_input` of setae_sim.h."""
+
+    _fields_ = (
+        ("time_us", c_int64),
+        ("attached", c_int32),
+        ("pulse_us", c_double * TENDONS),
+        ("pull_mm", c_double * TENDONS),
+    )
+
+
+class CPlantOutput(ctypes.Structure):
+    """`setae_plant_output` of setae_sim.h."""
+
+    _fields_ = (
+        ("position_mm", c_double * 3),
+        ("rotation", c_double * 9),
+        ("tension_n", c_double * TENDONS),
+        ("pressure_hpa", c_double),
+    )
+
+
+#: `setae_plant_step` of setae_sim.h.
+PlantStep = ctypes.CFUNCTYPE(c_int, c_void_p, POINTER(CPlantInput), POINTER(CPlantOutput))
 
 
 def library_path() -> Path:
@@ -107,6 +152,7 @@ def load() -> ctypes.CDLL:
         "get": (status, (world, c_char_p, vector)),
         "add_tube": (status, (world, vector, c_double)),
         "add_box": (status, (world, vector, vector, c_double)),
+        "use_plant": (status, (world, PlantStep, c_void_p)),
         "start": (status, (world, vector)),
         "now_us": (c_int64, (world,)),
         "send": (status, (world, c_char_p, c_size_t)),

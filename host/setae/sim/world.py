@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from setae.errors import InputError
-from setae.sim.library import CTruth, SimulationError, load
+from setae.errors import InputError, SetaeError
+from setae.sim.library import CPlantInput, CPlantOutput, CTruth, PlantStep, SimulationError, load
+from setae.sim.plugin import Drive, Plant, PluginError, checked
 
 __all__ = ["SensorFault", "Truth", "World", "parameter_names"]
 
 _BAD_ARGUMENT = -1
+_PLANT_FAILED = -5
 _READ_ROOM = 4096
 
 Array = NDArray[np.float64]
@@ -109,6 +111,8 @@ class World:
     parameters
         Values by the simulator's own names (see `parameter_names`); the others
         keep their defaults.
+    plant
+        Another plant in the place of the built-in spring, see `setae.sim.plugin`.
 
     Raises
     ------
@@ -132,6 +136,7 @@ class World:
         *,
         seed: int = 0,
         parameters: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+        plant: Plant | None = None,
     ) -> None:
         self._library = load()
         self._handle: int | None = None
@@ -148,6 +153,37 @@ class World:
         self._size = ctypes.c_size_t()
         for name, value in dict(parameters).items():
             self.set(name, value)
+        self._plant_error: Exception | None = None
+        if plant is not None:
+            self._step = PlantStep(self._stepper(plant))  # C holds no reference to it
+            self._change(self._library.setae_world_use_plant(self._handle, self._step, None))
+
+    def _stepper(self, plant: Plant) -> Callable[..., int]:
+        """A plant's step as C calls it: no exception may cross."""
+
+        def step(user: None, given: Any, wanted: Any) -> int:
+            del user
+            raw: CPlantInput = given.contents
+            bits = raw.attached
+            drive = Drive(
+                time_s=1e-6 * raw.time_us,
+                attached=(bool(bits & 1), bool(bits & 2), bool(bits & 4), bool(bits & 8)),
+                pulse_us=np.array(raw.pulse_us),
+                pull_mm=np.array(raw.pull_mm),
+            )
+            try:
+                position, rotation, tension, pressure = checked(plant.step(drive))
+            except Exception as error:  # told by whoever called into the world
+                self._plant_error = error
+                return 1
+            answer: CPlantOutput = wanted.contents
+            answer.position_mm[:] = position.tolist()
+            answer.rotation[:] = rotation.ravel().tolist()
+            answer.tension_n[:] = tension.tolist()
+            answer.pressure_hpa = pressure
+            return 0
+
+        return step
 
     def set(self, name: str, value: float) -> None:
         """Set a parameter, before the start.
@@ -330,6 +366,12 @@ class World:
     def _check(self, status: int) -> None:
         if status == 0:
             return
+        if status == _PLANT_FAILED and (error := self._plant_error) is not None:
+            self._plant_error = None
+            if isinstance(error, SetaeError):
+                raise error
+            what = f"{type(error).__name__}: {error}".rstrip(".: ")
+            raise PluginError(f"The plant's step failed: {what}.") from error
         text = self._library.setae_world_error(self._live).decode()
         problem = f"Simulator: {text}."
         if status == _BAD_ARGUMENT:

@@ -1,0 +1,126 @@
+"""Named plants: sets of the simulator's parameters that stand for one robot.
+
+``ideal`` has no imperfection. ``paper_like`` errs about as much as the paper's robot:
+one plausible set of imperfections, not an identification of it. ``random:SEED`` draws all of them, within what cheap
+servos, printed pulleys and wound line have. Simulated robots, all of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from setae.errors import InputError
+
+__all__ = ["CAUSES", "NAMES", "by_cause", "parameters", "resolve"]
+
+NAMES = ("ideal", "paper_like", "random:SEED")
+"""What `parameters` knows; SEED is any whole number from 0."""
+
+CAUSES: dict[str, tuple[str, ...]] = {
+    "bending stiffness": ("spring.bending_scale_",),
+    "zero offsets": ("tendon.offset_mm_",),
+    "winding gain": ("tendon.winding_error_",),
+    "backlash": ("tendon.backlash_mm",),
+}
+"""What a lab can mend, and the beginnings of the parameters' names that belong to it."""
+
+
+_PAPER_LIKE = {
+    "spring.bending_scale_x": 0.6,
+    "spring.bending_scale_y": 0.6,
+    "tendon.backlash_mm": 0.6,
+    "tendon.offset_mm_0": 0.8,
+    "tendon.offset_mm_1": -0.5,
+    "tendon.offset_mm_2": 0.4,
+    "tendon.offset_mm_3": -0.7,
+    "tendon.winding_error_0": -0.08,
+    "tendon.winding_error_1": -0.05,
+    "tendon.winding_error_2": -0.03,
+    "tendon.winding_error_3": -0.06,
+}
+
+
+def resolve(name: str, seed: int | None = None) -> str:
+    """Write a plant's name in full: ``random`` gets the seed.
+
+    Raises
+    ------
+    InputError
+        There is no such plant; the message names those that are.
+
+    Examples
+    --------
+    >>> resolve("random", 7)
+    'random:7'
+    """
+    kind, separator, number = name.partition(":")
+    if kind == "random":
+        if not separator and seed is not None:
+            number = str(seed)
+        if number.isdecimal() and number.isascii():
+            return f"random:{int(number)}"
+        raise InputError(
+            f"The plant {name!r} needs a seed.", "Give a whole number, such as random:7."
+        )
+    if name not in NAMES:
+        raise InputError(f"There is no plant {name!r}.", f"There are: {', '.join(NAMES)}.")
+    return name
+
+
+def parameters(name: str, seed: int | None = None) -> dict[str, float]:
+    """Return what a plant sets, by the simulator's own names.
+
+    Parameters
+    ----------
+    name
+        One of `NAMES`.
+    seed
+        Of ``random`` where the name gives none.
+
+    Returns
+    -------
+    dict
+        For `setae.sim.World` or the configuration's ``[simulator]``; what isn't in
+        it keeps the simulator's default. Empty for ``ideal``.
+
+    Raises
+    ------
+    InputError
+        There is no such plant.
+
+    Examples
+    --------
+    >>> parameters("ideal")
+    {}
+    >>> parameters("random:7") == parameters("random", 7)
+    True
+    """
+    name = resolve(name, seed)
+    if name.startswith("random:"):
+        return _random(int(name.removeprefix("random:")))
+    return dict(_PAPER_LIKE) if name == "paper_like" else {}
+
+
+def by_cause(values: dict[str, float]) -> dict[str, dict[str, float]]:
+    """Part a plant's parameters into imperfections that can be switched on alone.
+
+    Returns
+    -------
+    dict
+        The parameters of each cause in `CAUSES` that has any, in that order.
+    """
+    parts = {
+        cause: {key: value for key, value in values.items() if key.startswith(beginnings)}
+        for cause, beginnings in CAUSES.items()
+    }
+    return {cause: part for cause, part in parts.items() if part}
+
+
+def _random(seed: int) -> dict[str, float]:
+    rng = np.random.default_rng(seed)
+    values = {f"spring.bending_scale_{axis}": rng.uniform(0.5, 1) for axis in "xy"}
+    for i in range(4):
+        values[f"tendon.offset_mm_{i}"] = rng.uniform(-0.5, 3)
+        values[f"tendon.winding_error_{i}"] = float(np.clip(rng.normal(0, 0.07), -0.2, 0.2))
+    values["tendon.backlash_mm"] = rng.uniform(0.3, 1)
+    return values
