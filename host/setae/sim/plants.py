@@ -1,8 +1,9 @@
 """Named plants: sets of the simulator's parameters that stand for one robot.
 
 ``ideal`` has no imperfection. ``paper_like`` errs about as much as the paper's robot:
-one plausible set of imperfections, not an identification of it. ``random:SEED`` draws all of them, within what cheap
-servos, printed pulleys and wound line have. Simulated robots, all of them.
+one plausible set of imperfections, not an identification of it. ``random:SEED`` draws
+all of them, within what cheap servos, printed pulleys and wound line have. Simulated
+robots, all of them.
 """
 
 from __future__ import annotations
@@ -121,6 +122,7 @@ def _random(seed: int) -> dict[str, float]:
     values = {f"spring.bending_scale_{axis}": rng.uniform(0.5, 1) for axis in "xy"}
     for i in range(4):
         values[f"tendon.offset_mm_{i}"] = rng.uniform(-0.5, 3)
-        values[f"tendon.winding_error_{i}"] = float(np.clip(rng.normal(0, 0.07), -0.2, 0.2))
+        values[f"tendon.winding_error_{i}"] = np.clip(rng.normal(0, 0.07), -0.2, 0.2)
     values["tendon.backlash_mm"] = rng.uniform(0.3, 1)
-    return values
+    # Rounded, so that a log holds the very numbers.
+    return {key: round(float(value), 4) for key, value in values.items()}
