@@ -21,7 +21,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # The oracle that judges explorations is the tests' own.
 sys.path.insert(0, str(ROOT))
 
-from bench import avr, elf, kinematics, motion  # noqa: E402  # needs the path above
+from bench import avr_figures, elf, kinematics, motion  # noqa: E402  # needs the path above
+from bench.figure import Figure  # noqa: E402
 from tests.system import oracle  # noqa: E402
 
 from setae import rig  # noqa: E402
@@ -34,20 +35,8 @@ from setae_protocol.messages import BOARD_OVERHEAD_BYTES, HOST_OVERHEAD_BYTES  #
 
 RUNS = 3
 RANDOM_TRIALS = 100
-CONTACTS = 300
-STOPS = 100
 RANDOM_SEED = 20250101
 ELF = ROOT / ".pio" / "build" / "uno" / "firmware.elf"
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One measured figure."""
-
-    name: str
-    value: float
-    unit: str
-    how: str
 
 
 def paper_wall() -> Iterable[Figure]:
@@ -120,83 +109,6 @@ def firmware_size() -> Iterable[Figure]:
         "flash_bytes", sizes.flash_bytes, "B", "of 32256 beside the bootloader; the built ELF"
     )
     yield Figure("ram_static_bytes", sizes.ram_static_bytes, "B", "of 2048; the stack comes on top")
-
-
-def uno_loaded() -> Iterable[Figure]:
-    """How exact the pulses are, and how near the chip is to its limits."""
-    loaded = avr.loaded()
-    how = (
-        f"built ELF in the cycle-accurate UNO, {loaded.duration_s:.0f} s: line full in both"
-        " directions, sensor at 75 Hz +-3 %, new random widths over the whole range each frame"
-    )
-    yield Figure(
-        "servo_error_cycles_max",
-        loaded.servo_error_cycles_max,
-        "cycles",
-        f"{how}; width at the pins against the told one, {loaded.pulses} pulses, 62.5 ns a cycle",
-    )
-    yield Figure(
-        "servo_split_updates",
-        loaded.servo_split_updates,
-        "frames",
-        f"{how}; frames in which not all four had the told width",
-    )
-    yield Figure(
-        "servo_span_ms",
-        round(loaded.servo_span_ms, 3),
-        "ms",
-        "the same UNO: first edge to last edge of a frame's four pulses, each 2.5 ms; the first"
-        " edge is 0.1 ms after the frame's start",
-    )
-    yield Figure("rx_overruns", loaded.rx_overruns, "B", f"{how}; bytes the USART lost")
-    yield Figure(
-        "interrupts_off_us_max",
-        round(loaded.interrupts_off_us_max, 2),
-        "us",
-        f"{how}; handlers and critical sections, entry and return included",
-    )
-    yield Figure(
-        "stack_deepest_bytes",
-        loaded.stack_deepest_bytes,
-        "B",
-        f"{how}; RAM below the stack that was written to since power-on",
-    )
-
-
-def uno_contacts() -> Iterable[Figure]:
-    """How long a contact takes to freeze the pulses."""
-    times_ms = avr.contact_to_freeze_ms(CONTACTS)
-    yield Figure(
-        "contact_to_freeze_ms_max",
-        round(max(times_ms), 2),
-        "ms",
-        f"{CONTACTS} pressure steps at random phases, same UNO and load: to the first edge of the"
-        f" first frame that repeats the one before; mean {statistics.mean(times_ms):.1f}",
-    )
-
-
-def uno_stops() -> Iterable[Figure]:
-    """How long a stop takes to freeze the pulses."""
-    times_ms = avr.stop_to_freeze_ms(STOPS)
-    yield Figure(
-        "stop_to_freeze_ms_max",
-        round(max(times_ms), 2),
-        "ms",
-        f"{STOPS} stops at random phases, same UNO and load: from the stop's last byte to the first"
-        f" edge of the first frame that repeats the one before; mean"
-        f" {statistics.mean(times_ms):.1f}",
-    )
-
-
-def uno_query() -> Iterable[Figure]:
-    """How long a question takes."""
-    yield Figure(
-        "query_round_trip_idle_ms",
-        round(avr.query_round_trip_ms(), 3),
-        "ms",
-        "same UNO: a ping's first start bit to the last stop bit of its answer, line else idle,"
-        " median; the bytes alone take 1.44",
-    )
 
 
 @dataclass(frozen=True)
@@ -336,10 +248,7 @@ FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     "realtime_factor": realtime_factor,
     "frame_overhead": frame_overhead,
     "firmware_size": firmware_size,
-    "uno_loaded": uno_loaded,
-    "uno_contacts": uno_contacts,
-    "uno_stops": uno_stops,
-    "uno_query": uno_query,
+    **avr_figures.FIGURES,
     "random_obstacles": random_obstacles,
     "kinematics_speed": kinematics_speed,
     "motion_segments": motion_segments,

@@ -74,10 +74,12 @@ class FramePulses:
 class Driver:
     """A session with a simulated UNO, and all that was seen on its pins."""
 
-    def __init__(self, uno: Uno, *, session_id: int = 7) -> None:
+    def __init__(
+        self, uno: Uno, *, session_id: int = 7, transport: AvrTransport | None = None
+    ) -> None:
         self.uno = uno
         self.session_id = session_id
-        self.session = Session(AvrTransport(uno), session_id=session_id)
+        self.session = Session(transport or AvrTransport(uno), session_id=session_id)
         self.events: list[Event] = []
         self._edges: list[Edge] = []
         self._samples: list[Sample] = []

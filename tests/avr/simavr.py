@@ -54,6 +54,7 @@ class _Statistics(ctypes.Structure):
             "interrupts_off_at",
             "stack_bytes",
             "resets",
+            "turns",
             "timers_misused",
         )
     )
@@ -103,6 +104,8 @@ class Statistics:
         Deepest stack since power-on.
     resets
         Since power-on, the watchdog's included.
+    turns
+        How often the firmware fed the watchdog, which its loop does once a turn.
     """
 
     receive_overruns: int
@@ -112,6 +115,16 @@ class Statistics:
     interrupts_off_at: int
     stack_bytes: int
     resets: int
+    turns: int
+
+
+@dataclass(frozen=True, slots=True)
+class HandlerTime:
+    """Cycles in one interrupt's handler since power-on, from its entry to the end of RETI."""
+
+    count: int
+    total: int
+    longest: int
 
 
 def _load() -> ctypes.CDLL:
@@ -139,6 +152,9 @@ def _load() -> ctypes.CDLL:
         "uno_sensor_address": (None, [handle, ctypes.c_uint8]),
         "uno_stick_bus": (None, [handle, ctypes.c_int]),
         "uno_watch_interrupts": (None, [handle, ctypes.c_int]),
+        "uno_handler": (None, [handle, ctypes.c_int, *[ctypes.POINTER(cycle)] * 3]),
+        "uno_peek": (ctypes.c_uint8, [handle, ctypes.c_uint16]),
+        "uno_timer1_was_at": (cycle, [handle, ctypes.c_uint32]),
         "uno_statistics_get": (None, [handle, ctypes.POINTER(_Statistics)]),
     }
     for name, (result, arguments) in signatures.items():
@@ -295,7 +311,26 @@ class Uno:
             interrupts_off_at=raw.interrupts_off_at,
             stack_bytes=raw.stack_bytes,
             resets=raw.resets,
+            turns=raw.turns,
         )
+
+    def handler(self, vector: int) -> HandlerTime:
+        """Return how long an interrupt's handler ran; vectors count from 1, as avr-libc's do."""
+        count, total, longest = ctypes.c_uint64(), ctypes.c_uint64(), ctypes.c_uint64()
+        self._library.uno_handler(
+            self._handle, vector, ctypes.byref(count), ctypes.byref(total), ctypes.byref(longest)
+        )
+        return HandlerTime(count.value, total.value, longest.value)
+
+    def peek(self, address: int, size: int = 1) -> int:
+        """Return what stands in RAM, low byte first."""
+        return int.from_bytes(
+            bytes(self._library.uno_peek(self._handle, address + i) for i in range(size)), "little"
+        )
+
+    def timer1_was_at(self, count: int) -> int:
+        """Return the last cycle at which timer 1 became `count`."""
+        return int(self._library.uno_timer1_was_at(self._handle, count))
 
 
 class AvrTransport:

@@ -36,6 +36,7 @@ struct uno_statistics {
   uint64_t interrupts_off_at;
   uint64_t stack_bytes;
   uint64_t resets;
+  uint64_t turns;
   uint64_t timers_misused;
 };
 
@@ -148,7 +149,25 @@ void uno_statistics_get(Uno* uno, uno_statistics* out) {
           uno->longest_off_at(),
           static_cast<uint64_t>(uno->stack_bytes()),
           static_cast<uint64_t>(uno->resets()),
+          uno->turns(),
           uno->pins().timer1().misused() || uno->pins().timer2().misused()};
+}
+
+void uno_handler(Uno* uno, int vector, uint64_t* count, uint64_t* total, uint64_t* longest) {
+  const setae::uno::HandlerTime time = uno->handler(vector);
+  *count = time.count;
+  *total = time.total;
+  *longest = time.longest;
+}
+
+// A byte of the data space, without the side effects of reading it.
+uint8_t uno_peek(Uno* uno, uint16_t address) {
+  return uno->chip().get(address);
+}
+
+// The last cycle at which timer 1 became `count`.
+uint64_t uno_timer1_was_at(Uno* uno, uint32_t count) {
+  return uno->pins().timer1().was_at(count);
 }
 
 }  // extern "C"

@@ -58,14 +58,22 @@ Chip::Chip(const std::string& elf_path) : avr_(avr_make_mcu_by_name("atmega328p"
       uart_ = reinterpret_cast<avr_uart_t*>(io);
     if (kind == "twi")
       twi_ = reinterpret_cast<avr_twi_t*>(io);
+    if (kind == "watchdog")
+      watchdog_ = reinterpret_cast<avr_watchdog_t*>(io);
+    if (kind == "eeprom")
+      eeprom_ = reinterpret_cast<avr_eeprom_t*>(io);
+    if (kind == "adc")
+      adc_ = reinterpret_cast<avr_adc_t*>(io);
     if (kind == "timer") {
       avr_timer_t* timer = reinterpret_cast<avr_timer_t*>(io);
       if (timer->name >= '0' && timer->name <= '2')
         timers_[timer->name - '0'] = timer;
     }
   }
-  if (uart_ == nullptr || twi_ == nullptr || timers_[1] == nullptr || timers_[2] == nullptr)
+  if (uart_ == nullptr || twi_ == nullptr || timers_[1] == nullptr || timers_[2] == nullptr ||
+      watchdog_ == nullptr || eeprom_ == nullptr || adc_ == nullptr)
     throw std::runtime_error("this simavr lacks a peripheral of the ATmega328P");
+  watchdog_->io.ioctl = nullptr;  // it would answer WDR before the model here sees it
   // Otherwise a low D2 or D3 costs an event each cycle.
   avr_extint_set_strict_lvl_trig(avr_, 0, 0);
   avr_extint_set_strict_lvl_trig(avr_, 1, 0);

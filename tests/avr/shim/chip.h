@@ -5,9 +5,12 @@
 #include <stdint.h>
 
 extern "C" {
+#include <avr_adc.h>
+#include <avr_eeprom.h>
 #include <avr_timer.h>
 #include <avr_twi.h>
 #include <avr_uart.h>
+#include <avr_watchdog.h>
 #include <sim_avr.h>
 }
 
@@ -45,12 +48,18 @@ class Chip {
   avr_t* avr() { return avr_; }
   avr_uart_t& uart() { return *uart_; }
   avr_twi_t& twi() { return *twi_; }
+  avr_watchdog_t& watchdog() { return *watchdog_; }
+  avr_eeprom_t& eeprom() { return *eeprom_; }
+  avr_adc_t& adc() { return *adc_; }
   avr_timer_t& timer(int number) { return *timers_[number]; }
 
  private:
   avr_t* avr_;
   avr_uart_t* uart_ = nullptr;
   avr_twi_t* twi_ = nullptr;
+  avr_watchdog_t* watchdog_ = nullptr;
+  avr_eeprom_t* eeprom_ = nullptr;
+  avr_adc_t* adc_ = nullptr;
   avr_timer_t* timers_[3] = {};
   std::vector<std::unique_ptr<OnRead>> reads_;
   std::vector<std::unique_ptr<OnWrite>> writes_;

@@ -133,6 +133,12 @@ uint32_t Timer::count(Cycle when) const {
   return static_cast<uint32_t>(base_count_ + (tick(when) - base_tick_)) % kind_.modulus;
 }
 
+Cycle Timer::was_at(uint32_t value) const {
+  const Cycle now = chip_.cycle();
+  const uint32_t back = (count(now) + kind_.modulus - value) % kind_.modulus;
+  return origin_ + ((tick(now) - back) << shift_);
+}
+
 void Timer::rebase(Cycle when, uint32_t count) {
   base_count_ = count;
   base_tick_ = shift_ == kStopped ? 0 : tick(when);

@@ -33,6 +33,8 @@ class Timer {
 
   bool connected(Unit unit) const;
   bool latch(Unit unit) const { return units_[static_cast<int>(unit)].latch; }
+  // The last cycle at which the counter became that. Only while it runs.
+  Cycle was_at(uint32_t value) const;
   // GTCCR was written.
   void hold(uint8_t gtccr);
   // A pin was driven by a timer in a mode that is not modelled here.

@@ -15,11 +15,13 @@ namespace {
 constexpr uint16_t kMcusr = 0x54;
 constexpr uint8_t kPowerOnReset = 1 << 0;
 constexpr uint8_t kExternalReset = 1 << 1;
+constexpr uint8_t kWatchdogReset = 1 << 3;
 constexpr uint16_t kRamStart = 0x100;
 // Memory holds anything at power-on; no counter or pointer is likely to be that.
 constexpr uint8_t kPaint = 0xC5;
 // Section 7.7.1: four cycles to the vector, which simavr doesn't count.
 constexpr int kInterruptCycles = 4;
+constexpr int kRetiCycles = 4;
 constexpr Cycle kBurst = 1000000;
 
 const char* kNoNames[] = {nullptr};
@@ -32,13 +34,14 @@ Uno::Uno(const std::string& elf_path)
       sensor_(chip_),
       twi_(chip_, sensor_),
       pins_(chip_),
+      watchdog_(chip_, [this] { bitten_ = true; }),
       end_(chip_, [](Cycle) {}) {
   avr_t* avr = chip_.avr();
   listener_.uno = this;
   listener_.io.kind = "uno";
   listener_.io.avr = avr;
   listener_.io.irq_names = kNoNames;
-  listener_.io.reset = on_reset;
+  listener_.io.ioctl = on_ioctl;
   // Last, so that simavr's own have done theirs.
   avr_io_t* last = avr->io_port;
   while (last->next != nullptr)
@@ -46,14 +49,14 @@ Uno::Uno(const std::string& elf_path)
   last->next = &listener_.io;
 
   for (int i = 0; i < avr->interrupts.vector_count; ++i) {
-    vectors_.push_back(std::make_unique<Vector>(Vector{this, avr->interrupts.vector[i]}));
+    vectors_.push_back(std::make_unique<Vector>(Vector{this, avr->interrupts.vector[i], {}, 0}));
     avr_irq_register_notify(&avr->interrupts.vector[i]->irq[AVR_INT_IRQ_RUNNING], on_running,
                             vectors_.back().get());
   }
   memset(avr->data + kRamStart, kPaint, avr->ramend + 1u - kRamStart);
   avr_reset(avr);
   chip_.set(kMcusr, kPowerOnReset);
-  resets_ = 0;
+  reset_peripherals();
 }
 
 Uno::~Uno() {
@@ -64,35 +67,52 @@ Uno::~Uno() {
   }
 }
 
-void Uno::on_reset(avr_io_t* io) {
-  reinterpret_cast<Listener*>(io)->uno->reset_peripherals();
+int Uno::on_ioctl(avr_io_t* io, uint32_t request, void*) {
+  if (request != AVR_IOCTL_WATCHDOG_RESET)
+    return -1;
+  reinterpret_cast<Listener*>(io)->uno->watchdog_.feed();
+  return 0;
 }
 
 void Uno::reset_peripherals() {
-  ++resets_;
   usart_.reset();
   twi_.reset();
   pins_.reset();
+  watchdog_.reset();
   if (run_end_ > chip_.cycle())  // a reset empties simavr's list of events
     end_.set(run_end_);
 }
 
 void Uno::press_reset() {
+  restart(kExternalReset);
+}
+
+void Uno::restart(uint8_t cause) {
+  ++resets_;
   const Cycle now = chip_.cycle();
+  const uint8_t flags = static_cast<uint8_t>(chip_.get(kMcusr) | cause);
   avr_reset(chip_.avr());
   chip_.avr()->cycle = now;
-  chip_.set(kMcusr, chip_.get(kMcusr) | kExternalReset);
+  chip_.set(kMcusr, flags);
+  reset_peripherals();
 }
 
 void Uno::on_running(avr_irq_t*, uint32_t running, void* entry) {
-  const Vector& vector = *static_cast<Vector*>(entry);
+  Vector& vector = *static_cast<Vector*>(entry);
   avr_t* avr = vector.uno->chip_.avr();
   if (running) {
+    vector.entered = avr->cycle;
+    if (vector.vector->vector == vector.uno->watchdog_.vector())
+      vector.uno->watchdog_.entered();
     avr->cycle += kInterruptCycles;
     avr->run_cycle_count -= std::min<avr_cycle_count_t>(avr->run_cycle_count, kInterruptCycles);
     avr->run_cycle_count = std::max<avr_cycle_count_t>(avr->run_cycle_count, 1);
     return;
   }
+  const Cycle took = avr->cycle + kRetiCycles - vector.entered;
+  ++vector.time.count;
+  vector.time.total += took;
+  vector.time.longest = std::max(vector.time.longest, took);
   // After RETI the part runs one more instruction, simavr 1.6 two.
   if (avr->interrupt_state == -2)
     avr->interrupt_state = -1;
@@ -114,6 +134,10 @@ void Uno::run(Cycle end, bool stop_after_frame) {
     avr_run(avr);
     if (chip_.cycle() < before)
       avr->cycle = before;
+    if (bitten_) {
+      bitten_ = false;
+      restart(kWatchdogReset);
+    }
     if (watching_) {
       const bool off = !avr->sreg[S_I];
       if (off && !was_off_) {
@@ -139,6 +163,14 @@ void Uno::watch_interrupts(bool on) {
   was_off_ = !chip_.avr()->sreg[S_I];
   off_since_ = chip_.cycle();
   longest_off_ = 0;
+}
+
+HandlerTime Uno::handler(int number) const {
+  for (const auto& vector : vectors_) {
+    if (vector->vector->vector == number)
+      return vector->time;
+  }
+  return {};
 }
 
 int Uno::stack_bytes() const {

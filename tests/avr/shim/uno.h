@@ -9,9 +9,17 @@
 #include "pins.h"
 #include "twi.h"
 #include "usart.h"
+#include "watchdog.h"
 
 namespace setae {
 namespace uno {
+
+// Of one interrupt's handler, from the entry's first cycle to RETI's last.
+struct HandlerTime {
+  uint64_t count;
+  Cycle total;
+  Cycle longest;
+};
 
 class Uno {
  public:
@@ -37,9 +45,13 @@ class Uno {
   // Deepest stack since power-on.
   int stack_bytes() const;
   int resets() const { return resets_; }
+  // How often the main loop said that it turns, by the instruction WDR.
+  uint64_t turns() const { return watchdog_.feeds(); }
+  // By the vector's number, from 1 on.
+  HandlerTime handler(int vector) const;
 
  private:
-  // simavr's list of peripherals, joined to hear of resets: the watchdog's come from inside.
+  // simavr's list of peripherals, joined to hear of WDR.
   struct Listener {
     avr_io_t io;
     Uno* uno;
@@ -47,17 +59,22 @@ class Uno {
   struct Vector {
     Uno* uno;
     avr_int_vector_t* vector;
+    HandlerTime time;
+    Cycle entered;
   };
 
-  static void on_reset(avr_io_t* io);
+  static int on_ioctl(avr_io_t* io, uint32_t request, void* parameter);
   static void on_running(avr_irq_t* irq, uint32_t running, void* vector);
   void reset_peripherals();
+  // RAM stays, and the flags of earlier resets.
+  void restart(uint8_t cause);
 
   Chip chip_;
   Usart usart_;
   Lps33hw sensor_;
   Twi twi_;
   Pins pins_;
+  Watchdog watchdog_;
   Listener listener_ = {};
   std::vector<std::unique_ptr<Vector>> vectors_;
   Alarm end_;
@@ -68,7 +85,7 @@ class Uno {
   uint32_t off_at_ = 0;
   Cycle longest_off_ = 0;
   uint32_t longest_off_at_ = 0;
-  uint16_t stack_floor_ = 0;
+  bool bitten_ = false;
   int resets_ = 0;
 };
 
