@@ -37,6 +37,10 @@ const Entry kEntries[] = {
     SETAE_ONE(spring, poisson_ratio, 0.3, 0, 0.5),
     SETAE_ONE(spring, bending_scale_x, 1, 0.2, 5),
     SETAE_ONE(spring, bending_scale_y, 1, 0.2, 5),
+    // From x to the axis about which bending_scale_x holds.
+    SETAE_ONE(spring, bending_axis_deg, 0, -180, 180),
+    // How much stiffer the top is than the middle, and the base softer.
+    SETAE_ONE(spring, stiffness_gradient, 0, -0.8, 0.8),
     SETAE_ONE(spring, shear_scale, 1, 0.2, 5),
     SETAE_ONE(spring, solid_length_mm, 18, 1, 400),
     SETAE_ONE(spring, bore_radius_mm, 9, 1, 100),
@@ -44,20 +48,33 @@ const Entry kEntries[] = {
     SETAE_ONE(spring, damping_time_s, 0.01, 0, 0.2),
 
     SETAE_ONE(tendon, radius_mm, 8.3, 1, 100),
+    SETAE_ONE(tendon, diameter_mm, 0, 0, 5),
     SETAE_ONE(tendon, stiffness_n_per_mm, 10, 0.5, 100),
     SETAE_ONE(tendon, pulley_radius_mm, 35, 1, 200),
     SETAE_ONE(tendon, backlash_mm, 0, 0, 10),
+    // On the bore: coefficient, and how far a tendon creeps before all of it slides.
+    SETAE_ONE(tendon, friction, 0, 0, 0.5),
+    SETAE_ONE(tendon, presliding_mm, 0.1, 0.02, 5),
+    // Most that the winding may slip, of the wound length; drawn anew at each winding.
+    SETAE_ONE(tendon, winding_slip, 0, 0, 0.3),
     SETAE_ITEM(tendon, angle_deg, 0, 0, -360, 360),
     SETAE_ITEM(tendon, angle_deg, 1, 90, -360, 360),
     SETAE_ITEM(tendon, angle_deg, 2, 180, -360, 360),
     SETAE_ITEM(tendon, angle_deg, 3, 270, -360, 360),
     SETAE_FOUR(tendon, offset_mm, 0, -10, 10),
     SETAE_FOUR(tendon, winding_error, 0, -0.3, 0.3),
+    // Errors of the holes in the two plates, away from the axis and anticlockwise.
+    SETAE_FOUR(tendon, base_radial_mm, 0, -5, 5),
+    SETAE_FOUR(tendon, base_tangential_mm, 0, -5, 5),
+    SETAE_FOUR(tendon, top_radial_mm, 0, -5, 5),
+    SETAE_FOUR(tendon, top_tangential_mm, 0, -5, 5),
 
     // MG996R: facts and dead band from its data sheet.
     SETAE_ONE(servo, dead_band_us, 5, 0, 50),
     SETAE_ONE(servo, speed_mm_s, 190, 1, 5000),
     SETAE_ONE(servo, time_constant_s, 0.02, 0.001, 1),
+    // Gears and drive, at the pulley's rim; in series with the tendon.
+    SETAE_ONE(servo, stiffness_n_per_mm, 1000000, 0.5, 1000000),
     SETAE_FOUR(servo, pulse_free_us, 850, 400, 2600),
     SETAE_FOUR(servo, direction, 1, -1, 1),
     SETAE_FOUR(servo, us_per_degree, kUsPerDegree, 1, 100),
@@ -89,7 +106,18 @@ const Entry kEntries[] = {
     SETAE_ONE(board, pose_known, 1, 0, 1),
 
     SETAE_ONE(plant, tip_mass_g, 15, 0, 500),
+    // Tilted from z of frame D (the robot hangs) towards the azimuth.
     SETAE_ONE(plant, gravity_m_s2, 9.81, -20, 20),
+    SETAE_ONE(plant, gravity_tilt_deg, 0, -180, 180),
+    SETAE_ONE(plant, gravity_azimuth_deg, 0, -360, 360),
+    // A dead load in frame D, so far beyond the spring's top.
+    SETAE_ONE(plant, load_x_n, 0, -5, 5),
+    SETAE_ONE(plant, load_y_n, 0, -5, 5),
+    SETAE_ONE(plant, load_z_n, 0, -5, 5),
+    SETAE_ONE(plant, load_offset_mm, 0, 0, 300),
+    // How finely the rod is cut.
+    SETAE_ONE(plant, rod_elements, 10, 10, 20),
+    SETAE_ONE(plant, rod_extra_modes, 0, 0, 1),
 };
 
 #undef SETAE_FOUR
@@ -140,7 +168,9 @@ bool set_parameter(Parameters& parameters, const std::string& name, double value
   const bool is_direction = name.compare(0, 16, "servo.direction_") == 0;
   if (is_direction && std::fabs(value) != 1)
     return fail(error, name + " must be 1 or -1");
-  const bool is_switch = name == "board.pose_known";
+  if (name == "plant.rod_elements" && value != 10 && value != 20)
+    return fail(error, name + " must be 10 or 20");
+  const bool is_switch = name == "board.pose_known" || name == "plant.rod_extra_modes";
   if (is_switch && value != 0 && value != 1)
     return fail(error, name + " must be 0 or 1");
   entry->at(parameters) = value;
@@ -157,8 +187,22 @@ bool get_parameter(const Parameters& parameters, const std::string& name, double
 }
 
 bool check_parameters(const Parameters& p, std::string& error) {
-  if (p.tendon.radius_mm > p.spring.bore_radius_mm) {
-    return fail(error, "tendon.radius_mm must not exceed spring.bore_radius_mm");
+  const double bore_mm = p.spring.bore_radius_mm - 0.5 * p.tendon.diameter_mm;
+  if (p.tendon.radius_mm > bore_mm) {
+    return fail(error,
+                "tendon.radius_mm must not exceed spring.bore_radius_mm less half of "
+                "tendon.diameter_mm");
+  }
+  for (int i = 0; i < 4; ++i) {
+    const double base_mm =
+        std::hypot(p.tendon.radius_mm + p.tendon.base_radial_mm[i], p.tendon.base_tangential_mm[i]);
+    const double top_mm =
+        std::hypot(p.tendon.radius_mm + p.tendon.top_radial_mm[i], p.tendon.top_tangential_mm[i]);
+    if (base_mm > bore_mm || top_mm > bore_mm) {
+      return fail(error, std::string("tendon.") + (base_mm > bore_mm ? "base" : "top") +
+                             "_radial_mm_" + std::to_string(i) +
+                             " and its tangential_mm bring the hole outside of the bore");
+    }
   }
   if (p.spring.mean_diameter_mm > p.spring.outer_diameter_mm) {
     return fail(error, "spring.mean_diameter_mm must not exceed spring.outer_diameter_mm");

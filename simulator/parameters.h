@@ -10,15 +10,17 @@ namespace sim {
 struct Parameters {
   struct Spring {
     double free_length_mm, axial_rate_n_per_mm, mean_diameter_mm, outer_diameter_mm, poisson_ratio;
-    double bending_scale_x, bending_scale_y, shear_scale;
+    double bending_scale_x, bending_scale_y, bending_axis_deg, stiffness_gradient, shear_scale;
     double solid_length_mm, bore_radius_mm, mass_g, damping_time_s;
   } spring;
   struct Tendon {
-    double radius_mm, stiffness_n_per_mm, pulley_radius_mm, backlash_mm;
+    double radius_mm, diameter_mm, stiffness_n_per_mm, pulley_radius_mm, backlash_mm;
+    double friction, presliding_mm, winding_slip;
     std::array<double, 4> angle_deg, offset_mm, winding_error;
+    std::array<double, 4> base_radial_mm, base_tangential_mm, top_radial_mm, top_tangential_mm;
   } tendon;
   struct Servo {
-    double dead_band_us, speed_mm_s, time_constant_s;
+    double dead_band_us, speed_mm_s, time_constant_s, stiffness_n_per_mm;
     std::array<double, 4> pulse_free_us, direction, us_per_degree;
   } servo;
   struct Bristle {
@@ -37,7 +39,9 @@ struct Parameters {
     double clock_rate_ppm, poll_us, boot_us, pose_known;
   } board;
   struct PlantPart {
-    double tip_mass_g, gravity_m_s2;
+    double tip_mass_g, gravity_m_s2, gravity_tilt_deg, gravity_azimuth_deg;
+    double load_x_n, load_y_n, load_z_n, load_offset_mm;
+    double rod_elements, rod_extra_modes;
   } plant;
 };
 

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "dense.h"
 #include "rod.h"
 #include "tendon_path.h"
 
@@ -20,16 +21,23 @@ struct PlantSettings {
   double poisson_ratio;
   double bending_scale_x;
   double bending_scale_y;
+  double bending_axis_rad;
+  double stiffness_gradient;
   double shear_scale;
   double solid_length_mm;
   double bore_radius_mm;
   double damping_time_s;
   double spring_mass_g;
   double tip_mass_g;
-  double gravity_m_s2;  // along z of frame D
+  Vec3 gravity_m_s2;      // in frame D
+  Vec3 load_n;            // in frame D
+  double load_offset_mm;  // beyond U
   double tendon_stiffness_n_per_mm;
-  double tendon_radius_mm;
-  std::array<double, kTendons> tendon_angle_rad;
+  double friction;
+  double presliding_mm;
+  std::array<Vec3, kTendons> base_hole_mm, top_hole_mm;  // in the plates' planes
+  int rod_elements;
+  int rod_extra_modes;
 };
 
 class Plant {
@@ -51,6 +59,8 @@ class Plant {
   // as solved.
   double residual() const { return residual_; }
   bool solved() const { return residual_ < kTolerance; }
+  // Newton's steps that the last solution took.
+  int iterations() const { return iterations_; }
   // Still moving though its tendons are not.
   bool creeping() const { return creeping_; }
   long evaluations() const { return evaluations_; }
@@ -59,12 +69,10 @@ class Plant {
   static constexpr double kTolerance = 1e-4;
 
  private:
-  using Matrix = std::array<Modes, kModes>;
-
   struct State {
     Modes modes;
     double energy;
-    Modes gradient;
+    Modes gradient;   // friction's load included
     Modes geometric;  // the part of the gradient that needs a secant
     Shape shape;
     std::array<TendonPath, kTendons> paths;
@@ -81,6 +89,7 @@ class Plant {
 
   void evaluate(const Modes& modes, State& state);
   void solve();
+  void settle_friction(State& state);
   void add_weight(State& state) const;
   bool solid_contact(const Strain& strain, SolidContact& contact) const;
   void add_solid(State& state) const;
@@ -88,21 +97,30 @@ class Plant {
   Modes frozen_gradient(const State& state, const std::array<double, kTendons>& tension_n) const;
   void rebuild_secant();
   void update_secant(const State& from, const State& to);
+  Matrix hessian(const State& state) const;
   bool newton_step(Modes& step) const;
 
   PlantSettings settings_;
   Rod rod_;
-  std::array<Vec3, kTendons> holes_;
   double solid_penalty_;
   double solid_ratio_;
   std::array<double, kTendons> lengths_mm_{};
   Modes anchor_{};      // where the damper pulls to: the last step's end
   double damping_ = 0;  // relative to the rod's own stiffness
+  // Friction of each tendon in the bore. It has no energy: within a step of Newton's
+  // it is a constant load, and its derivative is a column beside the tendon's gradient.
+  std::array<double, kTendons> slide_from_{};  // at the step's start: -1 unwinds, 1 winds
+  std::array<double, kTendons> slide_{};
+  std::array<double, kTendons> path_from_mm_{};
+  bool may_slide_ = false;
+  Modes friction_load_{};
+  std::array<Modes, kTendons> friction_column_{};
   State state_{};
   State trial_{};
   Matrix secant_{};  // geometric stiffness, learnt from step to step
   bool secant_known_ = false;
   double residual_ = 0;
+  int iterations_ = 0;
   bool creeping_ = false;
   long evaluations_ = 0;
 };

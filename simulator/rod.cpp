@@ -4,16 +4,9 @@ namespace setae {
 namespace sim {
 namespace {
 
-enum Component { kBendX, kBendY, kTwist, kShearX, kShearY, kAxial, kComponents };
+enum Component { kBendX, kBendY, kTwist, kShearX, kShearY, kAxial };
 
-struct Mode {
-  Component component;
-  int order;
-};
-
-constexpr Mode kModeTable[kModes] = {
-    {kBendX, 0},  {kBendX, 1},  {kBendX, 2},  {kBendY, 0},  {kBendY, 1}, {kBendY, 2}, {kTwist, 0},
-    {kShearX, 0}, {kShearX, 1}, {kShearY, 0}, {kShearY, 1}, {kAxial, 0}, {kAxial, 1}};
+constexpr int kOrders[kComponents] = {3, 3, 1, 2, 2, 2};
 
 double legendre(int order, double u) {  // on 0..1
   const double x = 2 * u - 1;
@@ -22,25 +15,10 @@ double legendre(int order, double u) {  // on 0..1
       return 1;
     case 1:
       return x;
-    default:
+    case 2:
       return 0.5 * (3 * x * x - 1);
-  }
-}
-
-double component(const Strain& strain, Component which) {
-  switch (which) {
-    case kBendX:
-      return strain.curvature.x;
-    case kBendY:
-      return strain.curvature.y;
-    case kTwist:
-      return strain.curvature.z;
-    case kShearX:
-      return strain.stretch.x;
-    case kShearY:
-      return strain.stretch.y;
     default:
-      return strain.stretch.z;
+      return 0.5 * x * (5 * x * x - 3);
   }
 }
 
@@ -69,46 +47,61 @@ void exponential(const Vec3& turn, const Vec3& move, Mat3& rotation, Vec3& posit
 
 }  // namespace
 
-Rod::Rod(const Rigidity& rigidity, double length_mm)
-    : length_mm_(length_mm), element_mm_(length_mm / kElements) {
+Rod::Rod(const Rigidity& rigidity, double length_mm, int elements, int extra_modes)
+    : length_mm_(length_mm),
+      elements_(elements),
+      element_mm_(length_mm / elements),
+      cosine_(std::cos(rigidity.axis_rad)),
+      sine_(std::sin(rigidity.axis_rad)),
+      table_{},
+      basis_{} {
   const double stiffness[kComponents] = {rigidity.bending_x_nmm2, rigidity.bending_y_nmm2,
                                          rigidity.torsion_nmm2,   rigidity.shear_n,
                                          rigidity.shear_n,        rigidity.axial_n};
-  for (int m = 0; m < kModes; ++m) {
-    for (int e = 0; e < kElements; ++e) {
-      basis_[e][m] = legendre(kModeTable[m].order, (e + 0.5) / kElements);
+  for (int c = 0; c < kComponents; ++c) {
+    for (int order = 0; order < kOrders[c] + extra_modes; ++order)
+      table_[modes_++] = {c, order};
+  }
+  double weight[kMaxElements];
+  for (int e = 0; e < elements_; ++e)
+    weight[e] = 1 + rigidity.gradient * (2 * (e + 0.5) / elements_ - 1);
+  for (int m = 0; m < modes_; ++m) {
+    for (int e = 0; e < elements_; ++e) {
+      basis_[e][m] = legendre(table_[m].order, (e + 0.5) / elements_);
     }
-    // Sampled at the midpoints the polynomials are not quite orthogonal: make
-    // them so, then the elastic energy needs no matrix.
+    // Sampled at the midpoints, and weighted by the stiffness there, the polynomials
+    // are not orthogonal: make them so, then the elastic energy needs no matrix.
     for (int k = 0; k < m; ++k) {
-      if (kModeTable[k].component != kModeTable[m].component)
+      if (table_[k].component != table_[m].component)
         continue;
       double overlap = 0, square = 0;
-      for (int e = 0; e < kElements; ++e) {
-        overlap += basis_[e][m] * basis_[e][k];
-        square += basis_[e][k] * basis_[e][k];
+      for (int e = 0; e < elements_; ++e) {
+        overlap += weight[e] * basis_[e][m] * basis_[e][k];
+        square += weight[e] * basis_[e][k] * basis_[e][k];
       }
-      for (int e = 0; e < kElements; ++e)
+      for (int e = 0; e < elements_; ++e)
         basis_[e][m] -= overlap / square * basis_[e][k];
     }
     double square = 0;
-    for (int e = 0; e < kElements; ++e)
-      square += basis_[e][m] * basis_[e][m];
-    const double scale = 1 / std::sqrt(square * element_mm_ * stiffness[kModeTable[m].component]);
-    for (int e = 0; e < kElements; ++e)
+    for (int e = 0; e < elements_; ++e)
+      square += weight[e] * basis_[e][m] * basis_[e][m];
+    const double scale = 1 / std::sqrt(square * element_mm_ * stiffness[table_[m].component]);
+    for (int e = 0; e < elements_; ++e)
       basis_[e][m] *= scale;
   }
 }
 
 void Rod::shape(const Modes& modes, Shape& out) const {
+  out.elements = elements_;
   out.position[0] = {0, 0, 0};
   out.rotation[0] = identity();
-  for (int e = 0; e < kElements; ++e) {
+  for (int e = 0; e < elements_; ++e) {
     double strain[kComponents] = {0, 0, 0, 0, 0, 1};
-    for (int m = 0; m < kModes; ++m) {
-      strain[kModeTable[m].component] += basis_[e][m] * modes[m];
+    for (int m = 0; m < modes_; ++m) {
+      strain[table_[m].component] += basis_[e][m] * modes[m];
     }
-    out.strain[e] = {{strain[kBendX], strain[kBendY], strain[kTwist]},
+    out.strain[e] = {{cosine_ * strain[kBendX] - sine_ * strain[kBendY],
+                      sine_ * strain[kBendX] + cosine_ * strain[kBendY], strain[kTwist]},
                      {strain[kShearX], strain[kShearY], strain[kAxial]}};
     exponential(element_mm_ * out.strain[e].curvature, element_mm_ * out.strain[e].stretch,
                 out.step_rotation[e], out.step_position[e]);
@@ -117,10 +110,9 @@ void Rod::shape(const Modes& modes, Shape& out) const {
   }
 }
 
-void Rod::pull_back(const Shape& shape, const std::array<Wrench, kStations>& wrenches,
-                    Modes& gradient) const {
-  Wrench load = wrenches[kElements];  // all beyond this station, in its frame
-  for (int e = kElements - 1; e >= 0; --e) {
+void Rod::pull_back(const Shape& shape, const Wrenches& wrenches, Modes& gradient) const {
+  Wrench load = wrenches[elements_];  // all beyond this station, in its frame
+  for (int e = elements_ - 1; e >= 0; --e) {
     // Transposed right Jacobian of the exponential, as a series in ad: at 0.3 rad
     // an element what is cut off is below 1e-7.
     const Vec3 turn = element_mm_ * shape.strain[e].curvature;
@@ -143,9 +135,15 @@ void Rod::pull_back(const Shape& shape, const std::array<Wrench, kStations>& wre
 }
 
 void Rod::pull_back_strain(int element, const Strain& derivative, Modes& gradient) const {
-  for (int m = 0; m < kModes; ++m) {
-    gradient[m] += basis_[element][m] * component(derivative, kModeTable[m].component);
-  }
+  const Vec3& bend = derivative.curvature;
+  const double by_component[kComponents] = {cosine_ * bend.x + sine_ * bend.y,
+                                            -sine_ * bend.x + cosine_ * bend.y,
+                                            bend.z,
+                                            derivative.stretch.x,
+                                            derivative.stretch.y,
+                                            derivative.stretch.z};
+  for (int m = 0; m < modes_; ++m)
+    gradient[m] += basis_[element][m] * by_component[table_[m].component];
 }
 
 Vec3 Rod::midpoint(const Shape& shape, int element) const {
@@ -158,8 +156,8 @@ Vec3 Rod::midpoint(const Shape& shape, int element) const {
 
 Modes Rod::compressed(double length_mm) const {
   Modes modes{};
-  for (int m = 0; m < kModes; ++m) {
-    if (kModeTable[m].component == kAxial && kModeTable[m].order == 0) {
+  for (int m = 0; m < modes_; ++m) {
+    if (table_[m].component == kAxial && table_[m].order == 0) {
       modes[m] = (length_mm / length_mm_ - 1) / basis_[0][m];
     }
   }

@@ -10,24 +10,31 @@
 namespace setae {
 namespace sim {
 
-constexpr int kElements = 10;
-constexpr int kStations = kElements + 1;
+// As many as there can be; a rod of 10 elements is within 0.01 mm of the strong form,
+// more of them are for checking that.
+constexpr int kMaxElements = 20;
+constexpr int kMaxStations = kMaxElements + 1;
 // Curvature x and y three each, torsion one, shear and axial two each: the tip is
 // within 0.01 mm of the rod's strong form. With one of shear it is within 0.1 mm,
-// and tensions are off by 0.3 N.
-constexpr int kModes = 13;
+// and tensions are off by 0.3 N. `extra_modes` adds one to each.
+constexpr int kComponents = 6;
+constexpr int kPlainModes = 13;
+constexpr int kMaxModes = kPlainModes + kComponents;
 
 // Amplitudes scaled so that the elastic energy is half their sum of squares
 // (unit: root of N mm). This makes the plant's Hessian well conditioned.
-using Modes = std::array<double, kModes>;
+// Those that a rod does not use are zero.
+using Modes = std::array<double, kMaxModes>;
 
-// Stiffness per strain of the homogenised helix.
+// Stiffness per strain of the homogenised helix, in the middle of its length.
 struct Rigidity {
   double bending_x_nmm2;
   double bending_y_nmm2;
   double torsion_nmm2;
   double shear_n;
   double axial_n;
+  double axis_rad;  // from x to the axis that bending_x belongs to
+  double gradient;  // how much stiffer the top is than the middle, relative
 };
 
 struct Strain {
@@ -41,24 +48,30 @@ struct Wrench {
 };
 
 struct Shape {
-  std::array<Vec3, kStations> position;
-  std::array<Mat3, kStations> rotation;
-  std::array<Strain, kElements> strain;
-  std::array<Vec3, kElements> step_position;  // element's end in its start's frame
-  std::array<Mat3, kElements> step_rotation;
+  int elements;
+  std::array<Vec3, kMaxStations> position;
+  std::array<Mat3, kMaxStations> rotation;
+  std::array<Strain, kMaxElements> strain;
+  std::array<Vec3, kMaxElements> step_position;  // element's end in its start's frame
+  std::array<Mat3, kMaxElements> step_rotation;
 };
+
+using Wrenches = std::array<Wrench, kMaxStations>;
 
 class Rod {
  public:
-  Rod(const Rigidity& rigidity, double length_mm);
+  // 10 or 20 elements, 0 or 1 extra mode of each strain.
+  Rod(const Rigidity& rigidity, double length_mm, int elements, int extra_modes);
+
+  int elements() const { return elements_; }
+  int modes() const { return modes_; }
 
   void shape(const Modes& modes, Shape& out) const;
 
   // Adds to `gradient` what the wrenches on the stations (each in its station's
   // own frame) do on a change of each mode: the transposed Jacobian, without
   // ever forming it.
-  void pull_back(const Shape& shape, const std::array<Wrench, kStations>& wrenches,
-                 Modes& gradient) const;
+  void pull_back(const Shape& shape, const Wrenches& wrenches, Modes& gradient) const;
 
   // Adds what derivatives by the strains of element `element` do on each mode.
   void pull_back_strain(int element, const Strain& derivative, Modes& gradient) const;
@@ -71,9 +84,18 @@ class Rod {
   Modes compressed(double length_mm) const;
 
  private:
+  struct Mode {
+    int component;
+    int order;
+  };
+
   double length_mm_;
+  int elements_;
+  int modes_ = 0;
   double element_mm_;
-  double basis_[kElements][kModes];
+  double cosine_, sine_;  // of the stiffer axis
+  Mode table_[kMaxModes];
+  double basis_[kMaxElements][kMaxModes];
 };
 
 }  // namespace sim

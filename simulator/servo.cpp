@@ -6,10 +6,11 @@
 namespace setae {
 namespace sim {
 
-Servo::Servo(const ServoSettings& settings)
+Servo::Servo(const ServoSettings& settings, const Random& slip)
     : settings_(settings),
       target_us_(settings.pulse_free_us),
       position_us_(settings.pulse_free_us),
+      slip_(slip),
       length_mm_(settings.free_length_mm) {}
 
 void Servo::pulse(int64_t end_us, double width_us) {
@@ -61,8 +62,22 @@ void Servo::wind() {
   const double turned_mm = (position_us_ - settings_.pulse_free_us) * settings_.mm_per_us *
                            (1 + settings_.winding_error);
   const double play = 0.5 * settings_.backlash_mm;
+  const double before_mm = wound_mm_;
   wound_mm_ = std::min(std::max(wound_mm_, turned_mm - play), turned_mm + play);
-  length_mm_ = settings_.free_length_mm - wound_mm_;
+  if (wound_mm_ > before_mm && !winding_) {
+    winding_ = true;
+    slip_part_ = settings_.winding_slip * slip_.uniform();
+  }
+  if (wound_mm_ < before_mm)
+    winding_ = false;
+  if (wound_mm_ <= 0) {
+    slipped_mm_ = 0;
+  } else if (winding_) {
+    slipped_mm_ += slip_part_ * (wound_mm_ - std::max(before_mm, 0.0));
+  } else {
+    slipped_mm_ *= wound_mm_ / before_mm;
+  }
+  length_mm_ = settings_.free_length_mm - wound_mm_ + slipped_mm_;
 }
 
 }  // namespace sim

@@ -3,6 +3,8 @@
 
 #include <stdint.h>
 
+#include "random.h"
+
 namespace setae {
 namespace sim {
 
@@ -15,11 +17,12 @@ struct ServoSettings {
   double free_length_mm;  // what is left of the tendon at pulse_free_us
   double winding_error;   // relative
   double backlash_mm;
+  double winding_slip;  // most that slips, of the wound length
 };
 
 class Servo {
  public:
-  explicit Servo(const ServoSettings& settings);
+  Servo(const ServoSettings& settings, const Random& slip);
 
   // The servo measures a pulse at its end. One at a time: it must be over before
   // the next is announced.
@@ -44,6 +47,12 @@ class Servo {
   double target_us_;
   double position_us_;
   double wound_mm_ = 0;
+  // Turns that are wound slide on the pulley: each winding by another part, and
+  // unwinding gives it back in proportion.
+  Random slip_;
+  double slip_part_ = 0;
+  double slipped_mm_ = 0;
+  bool winding_ = false;
   double length_mm_;
 };
 

@@ -337,14 +337,14 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
       out->servo_length_mm[i] = truth.body.servos[i].length_mm();
       out->tension_n[i] = truth.top.tension_n[i];
     }
-    static_assert(SETAE_BACKBONE_POINTS == 2 * setae::sim::kElements + 1,
-                  "the backbone's points are stations and midpoints");
     if (w.foreign()) {
       write_cubic(truth.top, out->backbone_mm);
     } else {
-      for (int j = 0; j < setae::sim::kStations; ++j) {
-        write(shape.position[j], out->backbone_mm[2 * j]);
-        if (j < setae::sim::kElements) {
+      // Stations, and the midpoints between where there are only half as many.
+      const int stride = (SETAE_BACKBONE_POINTS - 1) / shape.elements;
+      for (int j = 0; j <= shape.elements; ++j) {
+        write(shape.position[j], out->backbone_mm[stride * j]);
+        if (stride == 2 && j < shape.elements) {
           write(plant.rod().midpoint(shape, j), out->backbone_mm[2 * j + 1]);
         }
       }

@@ -6,7 +6,6 @@ namespace setae {
 namespace sim {
 namespace {
 
-constexpr int kInner = kElements - 1;
 // Per mm, relative to the tension: a tendon that turns by 0.1 rad at a station
 // sinks 1 um into the bore.
 constexpr double kBoreStiffness = 100;
@@ -22,8 +21,10 @@ struct Block {  // 2 x 2
 
 void TendonPath::solve(const Shape& shape, const Vec3& base, const Vec3& top,
                        double bore_radius_mm) {
+  const int last_station = shape.elements;
+  top_ = top;
   point_[0] = base;
-  point_[kElements] = shape.position[kElements] + shape.rotation[kElements] * top;
+  point_[last_station] = shape.position[last_station] + shape.rotation[last_station] * top;
   const bool was_bent = touches_;
   converged_ = true;
   touches_ = false;
@@ -36,24 +37,24 @@ void TendonPath::solve(const Shape& shape, const Vec3& base, const Vec3& top,
     bend(shape, bore_radius_mm);
   }
   // The top hole feels the last piece's direction in both cases.
-  const int before = touches_ ? kElements - 1 : 0;
-  const Vec3 last = point_[kElements] - point_[before];
-  const Vec3 pull = into(shape.rotation[kElements], (1 / norm(last)) * last);
-  wrenches_[kElements] = {cross(top, pull), pull};
+  const int before = touches_ ? last_station - 1 : 0;
+  const Vec3 last = point_[last_station] - point_[before];
+  const Vec3 pull = into(shape.rotation[last_station], (1 / norm(last)) * last);
+  wrenches_[last_station] = {cross(top, pull), pull};
 }
 
 // The chord, and whether it keeps inside the bore. Leaves the chord's crossings,
 // moved into the bore, as a start for bend().
 bool TendonPath::straight(const Shape& shape, double bore_radius_mm) {
-  const Vec3 chord = point_[kElements] - point_[0];
+  const Vec3 chord = point_[shape.elements] - point_[0];
   length_mm_ = norm(chord);
   bool inside = true;
-  for (int j = 1; j <= kInner; ++j) {
+  for (int j = 1; j < shape.elements; ++j) {
     const Mat3& axes = shape.rotation[j];
     const double slope = dot(axes.ez, chord);
     const Vec3 offset = shape.position[j] - point_[0];
-    const double fraction =
-        std::fabs(slope) > 1e-9 ? dot(axes.ez, offset) / slope : static_cast<double>(j) / kElements;
+    const double fraction = std::fabs(slope) > 1e-9 ? dot(axes.ez, offset) / slope
+                                                    : static_cast<double>(j) / shape.elements;
     const Vec3 at = fraction * chord - offset;
     double u = dot(axes.ex, at), v = dot(axes.ey, at);
     const double radius = std::sqrt(u * u + v * v);
@@ -71,26 +72,27 @@ bool TendonPath::straight(const Shape& shape, double bore_radius_mm) {
 void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
   touches_ = true;
   converged_ = false;
-  std::array<Vec3, kElements> direction;
-  std::array<double, kElements> piece;
-  std::array<Crossing, kStations> step{};
-  std::array<Crossing, kStations> base = crossing_;
+  const int inner = shape.elements - 1;
+  std::array<Vec3, kMaxElements>& direction = direction_;
+  std::array<double, kMaxElements> piece;
+  std::array<Crossing, kMaxStations> step{};
+  std::array<Crossing, kMaxStations> base = crossing_;
   double base_length = 0, slope = 0, fraction = 1;
   bool have_step = false;
 
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    for (int j = 1; j <= kInner; ++j) {
+    for (int j = 1; j <= inner; ++j) {
       point_[j] = shape.position[j] + crossing_[j].u * shape.rotation[j].ex +
                   crossing_[j].v * shape.rotation[j].ey;
     }
     length_mm_ = 0;
-    for (int j = 0; j < kElements; ++j) {
+    for (int j = 0; j <= inner; ++j) {
       direction[j] = point_[j + 1] - point_[j];
       piece[j] = norm(direction[j]);
       direction[j] = (1 / piece[j]) * direction[j];
       length_mm_ += piece[j];
     }
-    for (int j = 1; j <= kInner; ++j) {
+    for (int j = 1; j <= inner; ++j) {
       const double over = std::hypot(crossing_[j].u, crossing_[j].v) - bore_radius_mm;
       if (over > 0)
         length_mm_ += 0.5 * kBoreStiffness * over * over;
@@ -98,7 +100,7 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
     if (have_step) {
       if (length_mm_ > base_length - 1e-4 * fraction * slope + 1e-11 && fraction > 1e-6) {
         fraction *= 0.5;
-        for (int j = 1; j <= kInner; ++j) {
+        for (int j = 1; j <= inner; ++j) {
           crossing_[j] = {base[j].u - fraction * step[j].u, base[j].v - fraction * step[j].v};
         }
         continue;
@@ -107,9 +109,9 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
         break;
     }
 
-    std::array<Crossing, kStations> gradient;
-    std::array<Block, kStations> diagonal, upper{};
-    for (int j = 1; j <= kInner; ++j) {
+    std::array<Crossing, kMaxStations> gradient{};
+    std::array<Block, kMaxStations> diagonal{}, upper{};
+    for (int j = 1; j <= inner; ++j) {
       const Vec3& ex = shape.rotation[j].ex;
       const Vec3& ey = shape.rotation[j].ey;
       const Vec3& in = direction[j - 1];
@@ -121,7 +123,7 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
       const double cross_term = -in_u * in_v * wi - out_u * out_v * wo;
       diagonal[j] = {(1 - in_u * in_u) * wi + (1 - out_u * out_u) * wo + 1e-9, cross_term,
                      cross_term, (1 - in_v * in_v) * wi + (1 - out_v * out_v) * wo + 1e-9};
-      if (j < kInner) {
+      if (j < inner) {
         const Vec3& nx = shape.rotation[j + 1].ex;
         const Vec3& ny = shape.rotation[j + 1].ey;
         const double next_u = dot(out, nx), next_v = dot(out, ny);
@@ -143,8 +145,8 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
     }
 
     // Block Thomas.
-    std::array<Crossing, kStations> right = gradient;
-    for (int j = 2; j <= kInner; ++j) {
+    std::array<Crossing, kMaxStations> right = gradient;
+    for (int j = 2; j <= inner; ++j) {
       const Block& d = diagonal[j - 1];
       const Block& o = upper[j - 1];
       const double scale = 1 / (d.a * d.d - d.b * d.c);
@@ -161,9 +163,9 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
     }
     double longest = 0;
     slope = 0;
-    for (int j = kInner; j >= 1; --j) {
+    for (int j = inner; j >= 1; --j) {
       double ru = right[j].u, rv = right[j].v;
-      if (j < kInner) {
+      if (j < inner) {
         const Block& o = upper[j];
         ru -= o.a * step[j + 1].u + o.b * step[j + 1].v;
         rv -= o.c * step[j + 1].u + o.d * step[j + 1].v;
@@ -173,22 +175,46 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm) {
       step[j] = {(d.d * ru - d.b * rv) * scale, (d.a * rv - d.c * ru) * scale};
       longest = std::max(longest, std::max(std::fabs(step[j].u), std::fabs(step[j].v)));
     }
-    for (int j = 1; j <= kInner; ++j)
+    for (int j = 1; j <= inner; ++j)
       slope += gradient[j].u * step[j].u + gradient[j].v * step[j].v;
     fraction = longest > kLongestStep_mm ? kLongestStep_mm / longest : 1;
     base = crossing_;
     base_length = length_mm_;
     have_step = true;
     converged_ = longest < kStepTolerance_mm;
-    for (int j = 1; j <= kInner; ++j) {
+    for (int j = 1; j <= inner; ++j) {
       crossing_[j] = {base[j].u - fraction * step[j].u, base[j].v - fraction * step[j].v};
     }
   }
 
-  for (int j = 1; j <= kInner; ++j) {
+  for (int j = 1; j <= inner; ++j) {
     const Vec3 arm = {crossing_[j].u, crossing_[j].v, 0};
     const Vec3 force = into(shape.rotation[j], direction[j - 1] - direction[j]);
     wrenches_[j] = {cross(arm, force), force};
+  }
+}
+
+void TendonPath::wrenches(const Shape& shape, double decay, Wrenches& out,
+                          Wrenches& by_decay) const {
+  const int last = shape.elements;
+  out[0] = by_decay[0] = {{0, 0, 0}, {0, 0, 0}};
+  double angle = 0, weight = 1;
+  for (int j = 1; j <= last; ++j) {
+    const double angle_in = angle, weight_in = weight;
+    Vec3 leaving = {0, 0, 0};
+    Vec3 arm = top_;
+    if (j < last) {
+      leaving = direction_[j];
+      arm = {crossing_[j].u, crossing_[j].v, 0};
+      angle += norm(direction_[j] - direction_[j - 1]);
+      weight = std::exp(-decay * angle);
+    }
+    const Vec3& coming = direction_[j - 1];
+    const Vec3 force = into(shape.rotation[j], weight_in * coming - weight * leaving);
+    const Vec3 change =
+        into(shape.rotation[j], (weight * angle) * leaving - (weight_in * angle_in) * coming);
+    out[j] = {cross(arm, force), force};
+    by_decay[j] = {cross(arm, change), change};
   }
 }
 

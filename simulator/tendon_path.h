@@ -20,7 +20,11 @@ class TendonPath {
   double length_mm() const { return length_mm_; }
 
   // Derivative of the length by a small body motion of each station.
-  const std::array<Wrench, kStations>& wrenches() const { return wrenches_; }
+  const Wrenches& wrenches() const { return wrenches_; }
+
+  // The same where friction on the bore lets the tension fall by exp(-decay * angle)
+  // from the base on, beside its derivative by `decay`. Only where it touches.
+  void wrenches(const Shape& shape, double decay, Wrenches& out, Wrenches& by_decay) const;
 
   bool touches_bore() const { return touches_; }
   // False where the path did not settle; its length is then an upper bound.
@@ -33,9 +37,11 @@ class TendonPath {
   struct Crossing {
     double u, v;
   };
-  std::array<Crossing, kStations> crossing_{};  // of the plane of each inner station
-  std::array<Vec3, kStations> point_{};
-  std::array<Wrench, kStations> wrenches_{};
+  std::array<Crossing, kMaxStations> crossing_{};  // of the plane of each inner station
+  std::array<Vec3, kMaxStations> point_{};
+  std::array<Vec3, kMaxElements> direction_{};  // of its pieces, where it touches
+  Vec3 top_{};
+  Wrenches wrenches_{};
   double length_mm_ = 0;
   bool touches_ = false;
   bool converged_ = true;

@@ -11,6 +11,12 @@ constexpr double kDegree = 3.14159265358979323846 / 180;
 // Samples in a row without a solution that end a run. One alone can be a snap
 // from one equilibrium to another.
 constexpr int kUnsolvedMost = 10;
+constexpr uint64_t kSlipStream = 16;  // of random numbers; the bristle has those before
+
+Vec3 hole_mm(double angle_rad, double radial_mm, double tangential_mm) {
+  const double cosine = std::cos(angle_rad), sine = std::sin(angle_rad);
+  return {radial_mm * cosine - tangential_mm * sine, radial_mm * sine + tangential_mm * cosine, 0};
+}
 
 PlantSettings plant_settings(const Parameters& p) {
   PlantSettings s{};
@@ -23,15 +29,31 @@ PlantSettings plant_settings(const Parameters& p) {
   s.bending_scale_y = p.spring.bending_scale_y;
   s.shear_scale = p.spring.shear_scale;
   s.solid_length_mm = p.spring.solid_length_mm;
-  s.bore_radius_mm = p.spring.bore_radius_mm;
+  s.bending_axis_rad = kDegree * p.spring.bending_axis_deg;
+  s.stiffness_gradient = p.spring.stiffness_gradient;
+  s.bore_radius_mm = p.spring.bore_radius_mm - 0.5 * p.tendon.diameter_mm;
   s.damping_time_s = p.spring.damping_time_s;
   s.spring_mass_g = p.spring.mass_g;
   s.tip_mass_g = p.plant.tip_mass_g;
-  s.gravity_m_s2 = p.plant.gravity_m_s2;
-  s.tendon_stiffness_n_per_mm = p.tendon.stiffness_n_per_mm;
-  s.tendon_radius_mm = p.tendon.radius_mm;
-  for (int i = 0; i < kTendons; ++i)
-    s.tendon_angle_rad[i] = kDegree * p.tendon.angle_deg[i];
+  const double tilt = kDegree * p.plant.gravity_tilt_deg;
+  const double azimuth = kDegree * p.plant.gravity_azimuth_deg;
+  s.gravity_m_s2 = p.plant.gravity_m_s2 * Vec3{std::sin(tilt) * std::cos(azimuth),
+                                               std::sin(tilt) * std::sin(azimuth), std::cos(tilt)};
+  s.load_n = {p.plant.load_x_n, p.plant.load_y_n, p.plant.load_z_n};
+  s.load_offset_mm = p.plant.load_offset_mm;
+  const double servo = p.servo.stiffness_n_per_mm, line = p.tendon.stiffness_n_per_mm;
+  s.tendon_stiffness_n_per_mm = servo * line / (servo + line);
+  s.friction = p.tendon.friction;
+  s.presliding_mm = p.tendon.presliding_mm;
+  for (int i = 0; i < kTendons; ++i) {
+    const double angle = kDegree * p.tendon.angle_deg[i];
+    s.base_hole_mm[i] = hole_mm(angle, p.tendon.radius_mm + p.tendon.base_radial_mm[i],
+                                p.tendon.base_tangential_mm[i]);
+    s.top_hole_mm[i] = hole_mm(angle, p.tendon.radius_mm + p.tendon.top_radial_mm[i],
+                               p.tendon.top_tangential_mm[i]);
+  }
+  s.rod_elements = static_cast<int>(p.plant.rod_elements);
+  s.rod_extra_modes = static_cast<int>(p.plant.rod_extra_modes);
   return s;
 }
 
@@ -46,6 +68,7 @@ ServoSettings servo_settings(const Parameters& p, int i) {
   s.free_length_mm = p.spring.free_length_mm + p.tendon.offset_mm[i];
   s.winding_error = p.tendon.winding_error[i];
   s.backlash_mm = p.tendon.backlash_mm;
+  s.winding_slip = p.tendon.winding_slip;
   return s;
 }
 
@@ -64,11 +87,11 @@ BristleSettings bristle_settings(const Parameters& p) {
   return s;
 }
 
-Body make_body(const Parameters& p) {
+Body make_body(const Parameters& p, uint64_t seed) {
   Body body{{}, Plant(plant_settings(p))};
   std::array<double, kTendons> lengths_mm;
   for (int i = 0; i < kTendons; ++i) {
-    body.servos.emplace_back(servo_settings(p, i));
+    body.servos.emplace_back(servo_settings(p, i), Random(seed, kSlipStream + i));
     lengths_mm[i] = body.servos[i].length_mm();
   }
   body.plant.settle(lengths_mm);
@@ -93,7 +116,7 @@ World::World(const Parameters& parameters, const Environment& environment, uint6
       environment_(environment),
       clock_error_ppb_(std::llround(1000 * parameters.board.clock_rate_ppm)),
       line_(line_settings(parameters)),
-      body_(make_body(parameters)),
+      body_(make_body(parameters, seed)),
       foreign_(std::move(foreign)),
       bristle_(bristle_settings(parameters), seed),
       next_sample_us_(sample_time_us(parameters, 1)) {
@@ -314,7 +337,7 @@ Top World::top(const Body& body) const {
   if (foreign_)
     return answer_.top;
   const Shape& shape = body.plant.shape();
-  return {shape.position[kElements], shape.rotation[kElements], body.plant.tension_n()};
+  return {shape.position[shape.elements], shape.rotation[shape.elements], body.plant.tension_n()};
 }
 
 void World::filament(const Top& top, Vec3& root_mm, Vec3& tip_mm) const {

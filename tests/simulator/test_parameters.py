@@ -26,7 +26,10 @@ def test_nonsense_is_refused_by_name(name: str) -> None:
 
 
 def test_lengths_stiffnesses_and_times_are_not_negative() -> None:
-    signed = ("angle", "offset", "error", "direction", "ppm", "gravity")
+    signed = (
+        "angle", "offset_mm_", "error", "direction", "ppm", "gravity", "axis", "gradient", "radial",
+        "tangential", "load_x", "load_y", "load_z",
+    )  # fmt: skip
     world = World()
     for name in NAMES:
         if not any(word in name for word in signed):

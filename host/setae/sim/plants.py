@@ -18,10 +18,15 @@ NAMES = ("ideal", "paper_like", "random:SEED")
 """What `parameters` knows; SEED is any whole number from 0."""
 
 CAUSES: dict[str, tuple[str, ...]] = {
-    "bending stiffness": ("spring.bending_scale_",),
+    "bending stiffness": ("spring.bending_", "spring.stiffness_gradient", "spring.shear_scale"),
     "zero offsets": ("tendon.offset_mm_",),
     "winding gain": ("tendon.winding_error_",),
     "backlash": ("tendon.backlash_mm",),
+    "winding slip": ("tendon.winding_slip",),
+    "friction": ("tendon.friction", "tendon.presliding_mm"),
+    "hole positions": ("tendon.base_", "tendon.top_"),
+    "weight and load": ("plant.", "spring.mass_g"),
+    "compliance": ("tendon.stiffness_n_per_mm", "servo.stiffness_n_per_mm"),
 }
 """What a lab can mend, and the beginnings of the parameters' names that belong to it."""
 
@@ -123,6 +128,13 @@ def _random(seed: int) -> dict[str, float]:
     for i in range(4):
         values[f"tendon.offset_mm_{i}"] = rng.uniform(-0.5, 3)
         values[f"tendon.winding_error_{i}"] = np.clip(rng.normal(0, 0.07), -0.2, 0.2)
+        for plate in ("base", "top"):
+            # In the plates' bore still, which is 0.7 mm wider than where the holes belong.
+            for way, most in (("radial", 0.6), ("tangential", 0.9)):
+                error_mm = np.clip(rng.normal(0, 0.3), -most, most)
+                values[f"tendon.{plate}_{way}_mm_{i}"] = error_mm
     values["tendon.backlash_mm"] = rng.uniform(0.3, 1)
+    values["tendon.friction"] = rng.uniform(0.05, 0.2)
+    values["tendon.winding_slip"] = rng.uniform(0, 0.05)
     # Rounded, so that a log holds the very numbers.
     return {key: round(float(value), 4) for key, value in values.items()}
