@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "protocol/messages.h"
+
 namespace setae {
 namespace sim {
 namespace {
@@ -96,7 +98,7 @@ const Entry kEntries[] = {
     SETAE_ONE(sensor, noise_hpa, 0.02, 0, 20),
     SETAE_ONE(sensor, drift_hpa_per_sqrt_s, 0.02, 0, 5),
 
-    SETAE_ONE(line, byte_us, 40, 1, 10000),
+    SETAE_ONE(line, byte_us, 10e6 / protocol::kBaud, 1, 10000),
     SETAE_ONE(line, down_latency_us, 1000, 0, 1000000),
     SETAE_ONE(line, up_flush_us, 4000, 0, 1000000),
 

@@ -90,12 +90,14 @@ def cpp_codec(name: str, fields: tuple[Field, ...]) -> list[str]:
                 .replace("in + 0,", "in,") for line in lines]  # fmt: skip
 
     return [
+        "#ifndef __AVR__",
         f"inline void encode(const {name}& message, uint8_t* out) {{",
         *body("put"),
         "}",
         f"inline void decode(const uint8_t* in, {name}& message) {{",
         *body("get"),
         "}",
+        "#endif",
         "",
     ]
 
@@ -107,12 +109,14 @@ def cpp_header() -> str:
         "//",
         *cpp_comment(
             "Field values are plain integers; where a field holds a code, the enumeration stands in"
-            " brackets. encode() writes and decode() reads exactly kSize bytes, little-endian. A"
-            " message whose name an enumeration has already is called ...Message."
+            " brackets. encode() writes and decode() reads exactly kSize bytes, little-endian; Wire"
+            " gives those bytes, without a copy where there need be none. A message whose name an"
+            " enumeration has already is called ...Message."
         ),
         "#pragma once",
         "",
         "#include <stdint.h>",
+        "#include <string.h>",
         "",
         "namespace setae {",
         "namespace protocol {",
@@ -148,6 +152,45 @@ def cpp_header() -> str:
         lines.append(f"  k{camel(message.source.name)} = 0x{message.source.number:02X},")
     lines += ["};", ""]
     lines += [
+        "#ifdef __AVR__",
+        "",
+        "// The board has a struct in memory as it is on the wire: no padding, low byte first.",
+        'static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "");',
+        "template <typename Message>",
+        "inline void encode(const Message& message, uint8_t* out) {",
+        '  static_assert(sizeof(Message) == Message::kSize, "");',
+        "  memcpy(out, &message, sizeof(Message));",
+        "}",
+        "template <typename Message>",
+        "inline void decode(const uint8_t* in, Message& message) {",
+        '  static_assert(sizeof(Message) == Message::kSize, "");',
+        "  memcpy(&message, in, sizeof(Message));",
+        "}",
+        "template <typename Message>",
+        "class Wire {",
+        " public:",
+        "  explicit Wire(const Message& message) : message_(message) {}",
+        "  const uint8_t* bytes() const {",
+        '    static_assert(sizeof(Message) == Message::kSize, "");',
+        "    return reinterpret_cast<const uint8_t*>(&message_);",
+        "  }",
+        "",
+        " private:",
+        "  const Message& message_;",
+        "};",
+        "",
+        "#else",
+        "",
+        "template <typename Message>",
+        "class Wire {",
+        " public:",
+        "  explicit Wire(const Message& message) { encode(message, bytes_); }",
+        "  const uint8_t* bytes() const { return bytes_; }",
+        "",
+        " private:",
+        "  uint8_t bytes_[Message::kSize];",
+        "};",
+        "",
         "namespace detail {",
         "inline void put8(uint8_t value, uint8_t* out) { out[0] = value; }",
         "inline void put16(uint16_t value, uint8_t* out) {",
@@ -166,6 +209,8 @@ def cpp_header() -> str:
         "  return get16(in) | (static_cast<uint32_t>(get16(in + 2)) << 16);",
         "}",
         "}  // namespace detail",
+        "",
+        "#endif",
         "",
     ]
     lines += cpp_struct(

@@ -29,7 +29,7 @@ def test_nothing_is_lost_with_the_line_full_and_all_servos_moving(driver: Driver
     statistics = driver.uno.statistics()
     assert statistics.receive_overruns == 0
     assert driver.reports[-1].telemetry.rx_damaged == damaged
-    # A byte on this line takes 40 us, and the chip holds two more.
+    # A byte on this line takes 20 us, and the chip holds two more.
     assert statistics.receive_longest_wait_cycles < 40 * CYCLES_PER_US
     assert statistics.interrupts_off_cycles < 20 * CYCLES_PER_US
     # Pulses are exact under load, too.

@@ -23,7 +23,7 @@ def test_drift_names_file_line_and_cure(tmp_path: Path) -> None:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     header = tmp_path / "firmware/lib/protocol/src/protocol/messages.h"
-    header.write_text(header.read_text().replace("kBaud = 250000", "kBaud = 115200"))
+    header.write_text(header.read_text().replace("kBaud = 500000", "kBaud = 115200"))
     (tmp_path / "protocol/REFERENCE.md").unlink()
     first, second = generate.drift(tmp_path)
     assert "messages.h" in first

@@ -84,16 +84,16 @@ def test_worlds_side_by_side_do_not_touch_each_other() -> None:
 
 def test_a_byte_takes_the_time_that_it_takes() -> None:
     world = started()
-    listen(world, 10_500, 1_000_000)
+    listen(world, 9_500, 1_000_000)
     world.send(HELLO)
     reply = world.run(1_000_000)
     frames = BoardDecoder().feed(reply)
     assert isinstance(frames[0].message, HelloReply)
-    # 1 ms in the USB chip, 40 us a byte each way, handed over on its 4 ms grid.
-    earliest_us = 10_500 + 1_000 + 40 * (len(HELLO) + len(reply))
+    # 1 ms in the USB chip, 20 us a byte each way, handed over on its 4 ms grid.
+    earliest_us = 9_500 + 1_000 + 20 * (len(HELLO) + len(reply))
     assert world.now_us >= earliest_us
     assert world.now_us % 4_000 == 0
-    assert world.now_us - earliest_us < 4_000 + 40
+    assert world.now_us - earliest_us < 4_000 + 20
 
 
 def test_telemetry_comes_with_every_frame_of_the_board_s_own_clock() -> None:

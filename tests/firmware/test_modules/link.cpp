@@ -82,7 +82,9 @@ TEST_CASE("a frame is written wholly or not at all") {
   int sent = 0;
   while (transmitter.send(protocol::BoardHeader{}, receipt))
     ++sent;
-  CHECK(sent > 5);
+  // What waits already delays whatever is urgent.
+  CHECK(hal.to_send().size() <= Transmitter::kAheadBytes + protocol::kFrameWireBytesMax);
+  CHECK(sent > 1);
   uint8_t byte;
   int bytes = 0;
   int delimiters = 0;

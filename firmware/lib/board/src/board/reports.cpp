@@ -10,6 +10,8 @@ namespace setae {
 // Nothing overtakes what finds no room: small answers to a host that asks without a break would
 // keep the line from ever having room for a record.
 void Board::report() {
+  if (!transmitter_.ready())
+    return;
   if (hello_wanted_) {
     if (!send_hello_reply())
       return;

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "hal/ring.h"
 #include "protocol/messages.h"
 
 namespace setae {
@@ -26,6 +27,13 @@ struct SensorReading {
   BoardTime sampled;     // when the sensor had it ready
 };
 
+// Bytes that never became part of a frame, since start, each modulo 256.
+struct LineErrors {
+  uint8_t framing;  // no stop bit: noise, or another rate
+  uint8_t overrun;  // the handler came too late
+  uint8_t dropped;  // the loop came too late: the ring was full
+};
+
 // Survives a reset, not a power cut. The HAL checks its CRC at start and clears
 // it where it is broken.
 struct Retained {
@@ -37,10 +45,13 @@ class Hal {
  public:
   virtual BoardTime now() = 0;
 
-  // Serial line. Neither call waits.
-  virtual bool read_byte(uint8_t& byte) = 0;
-  virtual uint8_t write_room() = 0;  // bytes that write() will take now
-  virtual void write(const uint8_t* data, uint8_t size) = 0;
+  // Serial line: what has come, and what is to go. The board reads the one and writes the other.
+  virtual ReceiveRing& received() = 0;
+  virtual TransmitRing& to_send() = 0;
+  // After each publish().
+  virtual void start_sending() = 0;
+  // What the line lost; each modulo 256.
+  virtual LineErrors line_errors() = 0;
 
   // Pulses for the next servo frame and those after it. The last call before a
   // frame starts counts, for all servos at once. Bit i of `attached`: servo i

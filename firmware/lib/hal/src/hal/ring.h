@@ -7,44 +7,72 @@
 
 namespace setae {
 
-// At 40 us a byte 128 bytes cover 5 ms in which the loop does not read.
+// At 20 us a byte 128 bytes cover 2.5 ms in which the loop does not read.
 constexpr uint8_t kReceiveRingBytes = 128;
-// Two telemetry frames.
+// The longest frame, behind what is on its way when it is written.
 constexpr uint8_t kTransmitRingBytes = 128;
 
+// Open, since a handler in assembler addresses its members. The indices run freely.
 template <uint8_t kBytes>
-class ByteRing {
+struct ByteRing {
   static_assert((kBytes & (kBytes - 1)) == 0, "the indices wrap at 256");
+  static constexpr uint8_t kMask = kBytes - 1;
 
- public:
   bool push(uint8_t byte) {
-    const uint8_t head = head_;
-    if (static_cast<uint8_t>(head - tail_) >= kBytes)
+    if (size() == kBytes)
       return false;
-    bytes_[head & (kBytes - 1)] = byte;
-    head_ = static_cast<uint8_t>(head + 1);
+    stage(head, byte);
+    publish(static_cast<uint8_t>(head + 1));
     return true;
   }
 
   bool pop(uint8_t& byte) {
-    const uint8_t tail = tail_;
-    if (tail == head_)
+    if (size() == 0)
       return false;
-    byte = bytes_[tail & (kBytes - 1)];
-    tail_ = static_cast<uint8_t>(tail + 1);
+    byte = *front();
+    drop(1);
     return true;
   }
 
-  uint8_t size() const { return static_cast<uint8_t>(head_ - tail_); }
+  uint8_t size() const { return static_cast<uint8_t>(head - tail); }
   uint8_t room() const { return static_cast<uint8_t>(kBytes - size()); }
 
+  // The reader's: the oldest bytes, as far as they lie in a row.
+  const uint8_t* front() const {
+    order();
+    return &bytes[tail & kMask];
+  }
+  uint8_t front_size() const {
+    const uint8_t to_wrap = static_cast<uint8_t>(kBytes - (tail & kMask));
+    const uint8_t waiting = size();
+    return waiting < to_wrap ? waiting : to_wrap;
+  }
+  void drop(uint8_t count) {
+    order();
+    tail = static_cast<uint8_t>(tail + count);
+  }
+
+  // The writer's, where it has room: bytes at indices from the head on, which the reader sees
+  // once the head has passed them.
+  void stage(uint8_t index, uint8_t byte) { bytes[index & kMask] = byte; }
+  void publish(uint8_t new_head) {
+    order();
+    head = new_head;
+  }
+
   // Only while the other side is idle.
-  void clear() { tail_ = head_; }
+  void clear() { tail = head; }
+
+  volatile uint8_t head = 0;  // owned by the writer
+  volatile uint8_t tail = 0;  // owned by the reader
+  uint8_t bytes[kBytes] = {};
 
  private:
-  volatile uint8_t head_ = 0;  // owned by the writer
-  volatile uint8_t tail_ = 0;  // owned by the reader
-  volatile uint8_t bytes_[kBytes] = {};
+  // The compiler keeps the bytes' reads and writes on their side of the index's.
+  static void order() { asm volatile("" ::: "memory"); }
 };
+
+using ReceiveRing = ByteRing<kReceiveRingBytes>;
+using TransmitRing = ByteRing<kTransmitRingBytes>;
 
 }  // namespace setae

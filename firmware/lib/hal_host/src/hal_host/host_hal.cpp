@@ -53,11 +53,6 @@ void HostHal::restart(protocol::ResetCause cause) {
   reset_cause_ = cause;
 }
 
-void HostHal::write(const uint8_t* data, uint8_t size) {
-  for (uint8_t i = 0; i < size; ++i)
-    transmit_.push(data[i]);
-}
-
 uint32_t HostHal::set_pulses(const Pulses& pulses, uint8_t attached) {
   next_ = pulses;
   next_attached_ = attached;

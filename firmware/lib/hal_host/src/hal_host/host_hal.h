@@ -5,7 +5,6 @@
 #include <stdint.h>
 
 #include "hal/hal.h"
-#include "hal/ring.h"
 
 namespace setae {
 
@@ -47,9 +46,10 @@ class HostHal final : public Hal {
   // ---- Hal ----
 
   BoardTime now() override { return to_board_time(board_us_); }
-  bool read_byte(uint8_t& byte) override { return receive_.pop(byte); }
-  uint8_t write_room() override { return transmit_.room(); }
-  void write(const uint8_t* data, uint8_t size) override;
+  ReceiveRing& received() override { return receive_; }
+  TransmitRing& to_send() override { return transmit_; }
+  void start_sending() override {}
+  LineErrors line_errors() override { return {0, 0, static_cast<uint8_t>(rx_overruns_)}; }
   uint32_t set_pulses(const Pulses& pulses, uint8_t attached) override;
   SensorReading read_sensor() override;
   protocol::ResetCause reset_cause() override { return reset_cause_; }
@@ -65,8 +65,8 @@ class HostHal final : public Hal {
   static BoardTime to_board_time(uint64_t time_us);
 
   uint64_t board_us_ = 0;
-  ByteRing<kReceiveRingBytes> receive_;
-  ByteRing<kTransmitRingBytes> transmit_;
+  ReceiveRing receive_;
+  TransmitRing transmit_;
   uint32_t rx_overruns_ = 0;
   Pulses next_ = {};
   uint8_t next_attached_ = 0;

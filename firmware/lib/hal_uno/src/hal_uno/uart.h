@@ -3,13 +3,20 @@
 
 #include <stdint.h>
 
+#include "hal/hal.h"
+
 namespace setae {
 namespace uart {
 
 void begin();
-bool read(uint8_t& byte);
-uint8_t write_room();
-void write(const uint8_t* data, uint8_t size);
+ReceiveRing& received();
+TransmitRing& to_send();
+void start_sending();
+LineErrors errors();
+
+// When the frame that was read last had come, in servo_pulses::ticks(). False where more has come
+// since: then it waited, and nobody knows how long.
+bool frame_ended(uint16_t& ticks);
 
 }  // namespace uart
 }  // namespace setae

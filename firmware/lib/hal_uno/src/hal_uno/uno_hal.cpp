@@ -44,16 +44,20 @@ BoardTime UnoHal::now() {
   return servo_pulses::now();
 }
 
-bool UnoHal::read_byte(uint8_t& byte) {
-  return uart::read(byte);
+ReceiveRing& UnoHal::received() {
+  return uart::received();
 }
 
-uint8_t UnoHal::write_room() {
-  return uart::write_room();
+TransmitRing& UnoHal::to_send() {
+  return uart::to_send();
 }
 
-void UnoHal::write(const uint8_t* data, uint8_t size) {
-  uart::write(data, size);
+void UnoHal::start_sending() {
+  uart::start_sending();
+}
+
+LineErrors UnoHal::line_errors() {
+  return uart::errors();
 }
 
 uint32_t UnoHal::set_pulses(const Pulses& pulses, uint8_t attached) {

@@ -15,9 +15,10 @@ class UnoHal final : public Hal {
   void service();
 
   BoardTime now() override;
-  bool read_byte(uint8_t& byte) override;
-  uint8_t write_room() override;
-  void write(const uint8_t* data, uint8_t size) override;
+  ReceiveRing& received() override;
+  TransmitRing& to_send() override;
+  void start_sending() override;
+  LineErrors line_errors() override;
   uint32_t set_pulses(const Pulses& pulses, uint8_t attached) override;
   SensorReading read_sensor() override;
   protocol::ResetCause reset_cause() override;

@@ -2,17 +2,20 @@
 
 namespace setae {
 
-bool Receiver::push(uint8_t wire) {
-  if (!decoder_.push(wire))
-    return false;
-  if (decoder_.size() >= protocol::HostHeader::kSize) {
-    decode(decoder_.data(), header_);
-    if (decoder_.size() - protocol::HostHeader::kSize == protocol::host_payload_size(type())) {
-      return true;
-    }
+uint8_t Receiver::take(const uint8_t* wire, uint8_t count, bool& message) {
+  const uint8_t taken = decoder_.take(wire, count, message);
+  if (message && !read_header()) {
+    decoder_.count_damaged();
+    message = false;
   }
-  decoder_.count_damaged();
-  return false;
+  return taken;
+}
+
+bool Receiver::read_header() {
+  if (decoder_.size() < protocol::HostHeader::kSize)
+    return false;
+  decode(decoder_.data(), header_);
+  return decoder_.size() - protocol::HostHeader::kSize == protocol::host_payload_size(type());
 }
 
 }  // namespace setae

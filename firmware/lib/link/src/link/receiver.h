@@ -11,7 +11,14 @@ namespace setae {
 class Receiver {
  public:
   // True where this byte ended a message. It stays readable until the next push().
-  bool push(uint8_t wire);
+  bool push(uint8_t wire) {
+    bool message;
+    take(&wire, 1, message);
+    return message;
+  }
+  // Takes bytes until one ends a frame, or all of them; returns how many. `message` tells whether
+  // there is one now.
+  uint8_t take(const uint8_t* wire, uint8_t count, bool& message);
 
   const protocol::HostHeader& header() const { return header_; }
   protocol::MessageType type() const { return static_cast<protocol::MessageType>(header_.type); }
@@ -22,6 +29,8 @@ class Receiver {
   void count_stray() { decoder_.count_damaged(); }
 
  private:
+  bool read_header();
+
   protocol::FrameDecoder decoder_;
   protocol::HostHeader header_ = {};
 };

@@ -11,26 +11,27 @@ namespace setae {
 
 class Transmitter {
  public:
+  // What waits already when a frame is written: enough to keep the line busy meanwhile, and little,
+  // since nothing that is written can be overtaken.
+  static constexpr uint8_t kAheadBytes = 24;
+  static_assert(kAheadBytes + protocol::kFrameWireBytesMax <= kTransmitRingBytes, "");
+
   explicit Transmitter(Hal& hal) : hal_(hal) {}
 
-  // Fills in the header's type and sequence. False where the line has no room now.
+  // Whether send() would send now.
+  bool ready() { return hal_.to_send().size() <= kAheadBytes; }
+
+  // Fills in the header's type and sequence. False where too much waits before it.
   template <typename Message>
   bool send(protocol::BoardHeader header, const Message& message) {
-    constexpr uint8_t kSize = protocol::BoardHeader::kSize + Message::kSize;
-    uint8_t wire[kSize + protocol::kCrcBytes + protocol::kStuffingBytes];
-    if (hal_.write_room() < sizeof(wire))
-      return false;
     header.type = static_cast<uint8_t>(Message::kType);
-    header.sequence = sequence_++;
-    // The stuffing takes place where the frame is: one buffer, not two, on a small stack.
-    uint8_t* const frame = wire + 1;
-    encode(header, frame);
-    encode(message, frame + protocol::BoardHeader::kSize);
-    hal_.write(wire, protocol::encode_frame(frame, kSize, wire));
-    return true;
+    protocol::Wire<Message> wire(message);
+    return send_bytes(header, wire.bytes(), Message::kSize);
   }
 
  private:
+  bool send_bytes(protocol::BoardHeader& header, const uint8_t* payload, uint8_t size);
+
   Hal& hal_;
   uint8_t sequence_ = 0;
 };

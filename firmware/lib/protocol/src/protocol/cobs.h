@@ -5,8 +5,55 @@
 
 #include <stdint.h>
 
+#include "protocol/flash.h"
+
 namespace setae {
 namespace protocol {
+
+// Stuffs one byte at a time into a sink, which has
+//   void stage(uint8_t index, uint8_t byte)   in any order
+//   void publish(uint8_t count)               so many bytes are final
+class CobsEncoder {
+ public:
+  template <typename Sink>
+  SETAE_HOT void push(uint8_t byte, Sink& sink) {
+    if (byte != 0) {
+      sink.stage(at_, byte);
+    } else {
+      end_run(sink);
+    }
+    ++at_;
+  }
+
+  // Returns how many bytes there are.
+  template <typename Sink>
+  uint8_t finish(Sink& sink) {
+    end_run(sink);
+    return at_;
+  }
+
+ private:
+  template <typename Sink>
+  SETAE_HOT void end_run(Sink& sink) {
+    sink.stage(code_at_, static_cast<uint8_t>(at_ - code_at_));
+    sink.publish(at_);
+    code_at_ = at_;
+  }
+
+  uint8_t at_ = 1;
+  uint8_t code_at_ = 0;
+};
+
+// Into plain memory.
+class MemorySink {
+ public:
+  explicit MemorySink(uint8_t* wire) : wire_(wire) {}
+  void stage(uint8_t index, uint8_t byte) { wire_[index] = byte; }
+  void publish(uint8_t) {}
+
+ private:
+  uint8_t* wire_;
+};
 
 // `wire` takes size + 1 bytes; the delimiter is not among them. size <= 253. In place where
 // data is wire + 1.
@@ -21,13 +68,29 @@ class CobsDecoder {
   };
 
   // `wire` is not the delimiter.
-  Step push(uint8_t wire, uint8_t& out);
+  SETAE_HOT Step push(uint8_t wire, uint8_t& out) {
+    if (left_ != 0) {
+      --left_;
+      out = wire;
+      return Step::kByte;
+    }
+    left_ = static_cast<uint8_t>(wire - 1);
+    const bool first = empty_;
+    empty_ = false;
+    if (first)
+      return Step::kNothing;
+    out = 0;  // each code byte but the first stands where a zero was
+    return Step::kByte;
+  }
 
   // Whether the frame may end here: its last run is complete.
   bool complete() const { return left_ == 0; }
   // No byte since the start.
   bool empty() const { return empty_; }
-  void restart();
+  void restart() {
+    left_ = 0;
+    empty_ = true;
+  }
 
  private:
   uint8_t left_ = 0;  // bytes left in the run

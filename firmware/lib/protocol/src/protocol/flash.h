@@ -11,6 +11,9 @@
 #define SETAE_FLASH
 #endif
 
+// For what runs once a byte: the compiler, told to save flash, would make a call of it.
+#define SETAE_HOT inline __attribute__((always_inline))
+
 namespace setae {
 namespace protocol {
 

@@ -3,15 +3,15 @@
 namespace setae {
 namespace protocol {
 
-uint8_t encode_frame(uint8_t* frame, uint8_t size, uint8_t* wire) {
-  detail::put32(crc32c(frame, size), frame + size);
-  size += kCrcBytes;
-  cobs_encode(frame, size, wire);
-  wire[size + 1] = 0;
-  return size + kStuffingBytes;
+uint8_t encode_frame(const uint8_t* frame, uint8_t size, uint8_t* wire) {
+  MemorySink sink(wire);
+  FrameEncoder<MemorySink> encoder(sink);
+  encoder.add(frame, size);
+  return encoder.finish();
 }
 
-bool FrameDecoder::push(uint8_t wire) {
+uint8_t FrameDecoder::take(const uint8_t* wire, uint8_t count, bool& good) {
+  good = false;
   if (ended_) {
     cobs_.restart();
     crc_ = Crc32c();
@@ -19,22 +19,36 @@ bool FrameDecoder::push(uint8_t wire) {
     too_long_ = false;
     ended_ = false;
   }
-  if (wire == 0)
-    return finish();
-  uint8_t byte;
-  if (cobs_.push(wire, byte) == CobsDecoder::Step::kNothing)
-    return false;
-  if (size_ == kFrameBytesMax) {
-    too_long_ = true;
-    return false;
+  CobsDecoder cobs = cobs_;  // copies that can stay in registers
+  Crc32c crc = crc_;
+  uint8_t* out = bytes_ + size_;
+  uint8_t taken = 0;
+  while (taken != count) {
+    const uint8_t coded = *wire++;
+    ++taken;
+    if (coded == 0) {
+      ended_ = true;
+      break;
+    }
+    uint8_t byte;
+    if (cobs.push(coded, byte) == CobsDecoder::Step::kNothing)
+      continue;
+    if (out == bytes_ + kFrameBytesMax) {
+      too_long_ = true;
+      continue;
+    }
+    *out++ = byte;
+    crc.add(byte);
   }
-  bytes_[size_++] = byte;
-  crc_.add(byte);
-  return false;
+  cobs_ = cobs;
+  crc_ = crc;
+  size_ = static_cast<uint8_t>(out - bytes_);
+  if (ended_)
+    good = finish();
+  return taken;
 }
 
 bool FrameDecoder::finish() {
-  ended_ = true;
   // Two delimiters in a row: a sender may lead with one to end what noise began.
   if (cobs_.empty())
     return false;

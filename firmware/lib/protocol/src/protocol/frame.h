@@ -16,17 +16,62 @@ static_assert(kFrameBytesMax <= 253, "cobs_encode knows short frames only");
 static_assert(BoardHeader::kSize + kBoardPayloadMax + kCrcBytes <= kFrameBytesMax, "");
 static_assert(HostHeader::kSize + kHostPayloadMax + kCrcBytes <= kFrameBytesMax, "");
 
-// Appends the CRC to the `size` bytes of header and payload in `frame`, which has room for it,
-// and writes the wire bytes, delimiter included. Returns how many. In place where frame is
-// wire + 1.
-uint8_t encode_frame(uint8_t* frame, uint8_t size, uint8_t* wire);
+// Makes a frame in one pass: what is published may be on the line while the rest is still to come.
+template <typename Sink>
+class FrameEncoder {
+ public:
+  explicit FrameEncoder(const Sink& sink) : sink_(sink) {}
+
+  void add(const uint8_t* data, uint8_t size) {
+    Sink sink = sink_;  // copies that can stay in registers
+    CobsEncoder cobs = cobs_;
+    Crc32c crc = crc_;
+    for (; size != 0; --size) {
+      const uint8_t byte = *data++;
+      crc.add(byte);
+      cobs.push(byte, sink);
+    }
+    cobs_ = cobs;
+    crc_ = crc;
+  }
+
+  // CRC and delimiter. Returns the bytes on the wire.
+  uint8_t finish() {
+    uint32_t crc = crc_.value();
+    for (uint8_t i = 0; i < kCrcBytes; ++i) {
+      cobs_.push(static_cast<uint8_t>(crc), sink_);
+      crc >>= 8;
+    }
+    const uint8_t size = cobs_.finish(sink_);
+    sink_.stage(size, 0);
+    sink_.publish(size + 1);
+    return size + 1;
+  }
+
+ private:
+  Sink sink_;
+  CobsEncoder cobs_;
+  Crc32c crc_;
+};
+
+// The `size` bytes of header and payload in `frame` as they go over the wire, delimiter included.
+// Returns how many.
+uint8_t encode_frame(const uint8_t* frame, uint8_t size, uint8_t* wire);
 
 // Wire bytes in, whole frames with a right CRC out. Whatever else arrives is counted and
 // skipped up to the next delimiter.
 class FrameDecoder {
  public:
-  // True where this byte ended a good frame. It stays readable until the next push().
-  bool push(uint8_t wire);
+  // Takes bytes until one ends a frame, or all of them; returns how many. `good` tells whether
+  // the last one taken ended a good frame, which stays readable until the next call.
+  uint8_t take(const uint8_t* wire, uint8_t count, bool& good);
+
+  // The same for one byte.
+  bool push(uint8_t wire) {
+    bool good;
+    take(&wire, 1, good);
+    return good;
+  }
 
   // Header and payload of that frame.
   const uint8_t* data() const { return bytes_; }

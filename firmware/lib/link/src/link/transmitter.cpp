@@ -1,0 +1,40 @@
+#include "link/transmitter.h"
+
+namespace setae {
+
+namespace {
+
+// The line gets each run of bytes as soon as it is stuffed.
+class LineSink {
+ public:
+  explicit LineSink(Hal& hal) : hal_(hal), ring_(hal.to_send()), start_(ring_.head) {}
+  void stage(uint8_t index, uint8_t byte) {
+    ring_.stage(static_cast<uint8_t>(start_ + index), byte);
+  }
+  void publish(uint8_t count) {
+    ring_.publish(static_cast<uint8_t>(start_ + count));
+    hal_.start_sending();
+  }
+
+ private:
+  Hal& hal_;
+  TransmitRing& ring_;
+  const uint8_t start_;
+};
+
+}  // namespace
+
+bool Transmitter::send_bytes(protocol::BoardHeader& header, const uint8_t* payload, uint8_t size) {
+  if (!ready())
+    return false;
+  header.sequence = sequence_++;
+  LineSink line(hal_);
+  protocol::FrameEncoder<LineSink> frame(line);
+  protocol::Wire<protocol::BoardHeader> wire(header);
+  frame.add(wire.bytes(), protocol::BoardHeader::kSize);
+  frame.add(payload, size);
+  frame.finish();
+  return true;
+}
+
+}  // namespace setae
