@@ -3,18 +3,24 @@
 A witness sits between the simulated board and the bad line. Now and then a stop, a
 guarded move that trips or a broken sensor interrupts.
 
-    python -m tests.system.link_stress --commands 1000000 --rate 0.01
+    python -m tests.system.link_stress --commands 1000000 --rate 0.01 --record
+
+`--record` appends what came out to `link_runs.json`, with date and commit.
 """
 
 from __future__ import annotations
 
 import argparse
+import datetime
+import json
 import random
+import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from itertools import pairwise
+from pathlib import Path
 
 from tests.system.witness import Witness, read, spell
 
@@ -40,6 +46,7 @@ from setae_protocol.messages import (
     Trip,
 )
 
+RUNS = Path(__file__).with_name("link_runs.json")
 SECOND_US = 1_000_000
 UNDER_WAY = 12
 THRESHOLD_RAW = 15 * PRESSURE_LSB_PER_HPA
@@ -308,15 +315,31 @@ class Stress:
                 count.segments_lost += 1
 
 
+def record(count: Count, *, seed: int, rate: float) -> None:
+    """Append a run to the file of runs."""
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short=10", "HEAD"],
+        cwd=RUNS.parent, check=True, capture_output=True, text=True,
+    ).stdout.strip()  # fmt: skip
+    runs = json.loads(RUNS.read_text()) if RUNS.is_file() else []
+    when = datetime.datetime.now(datetime.UTC).date().isoformat()
+    runs.append({"date": when, "commit": commit, "seed": seed, "rate": rate, **asdict(count)})
+    lines = ",\n".join(json.dumps(run) for run in runs)
+    RUNS.write_text(f"[\n{lines}\n]\n")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--commands", type=int, default=100_000)
     parser.add_argument("--rate", type=float, default=0.01, help="of each kind of fault, each way")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--record", action="store_true", help="append to link_runs.json")
     options = parser.parse_args(arguments)
     count = Stress(options.seed, options.rate).run(options.commands)
     for item in fields(count):
         sys.stdout.write(f"{item.name:30} {getattr(count, item.name):g}\n")
+    if options.record:
+        record(count, seed=options.seed, rate=options.rate)
     return int(count.wrong != 0)
 
 

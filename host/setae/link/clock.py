@@ -9,6 +9,10 @@ the lower envelope of the delay.
 The line is the edge of the points' lower convex hull below their mean, which is
 the one with the least sum of distances (Moon, Skelly and Towsley, "Estimation
 and removal of clock skew from network delay measurements", INFOCOM 1999).
+
+How surely: a board's answer was made after the question was sent, so each ping
+gives a point that the true line can't be below. With the resonator's tolerance,
+the lines between the two kinds of points are all that are possible.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, TypeAlias
 
 __all__ = ["Clock", "ClockEstimate"]
 
@@ -26,6 +30,8 @@ _BUCKETS: Final = 120
 _RATE_ERROR_MAX: Final = 0.006
 # Below this span a few ms of delay look like more rate error than a resonator has.
 _SPAN_FOR_RATE_US: Final = 2_000_000
+# What the resonator makes of a frame's time on the line, and whole microseconds.
+_LINE_ERROR_US: Final = 25
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +41,21 @@ class ClockEstimate:
     Attributes
     ----------
     board_us, host_us
-        A pair of times that belong together.
+        A pair of times that belong together, the newest.
     rate
         Host microseconds that pass in one microsecond of the board.
     uncertainty_us
-        How much earlier than said the host time may be; infinite until a ping came back.
+        How wrong `host_us` may be at most, either way; infinite until a ping came back.
+        It holds where both clocks ran evenly for the last minute.
+    rate_uncertainty
+        How wrong `rate` may be at most, either way.
     """
 
     board_us: float
     host_us: float
     rate: float
     uncertainty_us: float
+    rate_uncertainty: float
 
     def to_host_us(self, board_us: float) -> float:
         """Return the host time of a board time."""
@@ -54,6 +64,10 @@ class ClockEstimate:
     def to_board_us(self, host_us: float) -> float:
         """Return the board time of a host time."""
         return self.board_us + (host_us - self.host_us) / self.rate
+
+    def uncertainty_at_us(self, board_us: float) -> float:
+        """Return how wrong the host time of a board time may be at most, either way."""
+        return self.uncertainty_us + abs(board_us - self.board_us) * self.rate_uncertainty
 
 
 class Clock:
@@ -112,30 +126,54 @@ class Clock:
         if not self._buckets:
             raise ValueError("no frame with a board time has arrived yet")
         points = sorted((board, delay) for _, board, delay in self._buckets)
-        mean = sum(board for board, _ in points) / len(points)
-        slope = 0.0
-        board, delay = min(points, key=lambda point: point[1])
+        upper = _lower_hull(points)
+        # No line through the lower points leaves out one below another's hull.
+        lower = [(x, -y) for x, y in _lower_hull(sorted((x, -y) for x, y in self._sent))]
+        slowest, fastest = _slopes_between(upper, lower)
+        slope = (slowest + fastest) / 2
         if points[-1][0] - points[0][0] >= _SPAN_FOR_RATE_US:
-            hull = _lower_hull(points)
-            for (x0, y0), (x1, y1) in pairwise(hull):
+            mean = sum(board for board, _ in points) / len(points)
+            for (x0, y0), (x1, y1) in pairwise(upper):
                 if x0 <= mean <= x1:
                     slope = (y1 - y0) / (x1 - x0)
-            slope = max(-_RATE_ERROR_MAX, min(_RATE_ERROR_MAX, slope))
-            board, delay = min(points, key=lambda point: point[1] - slope * (point[0] - mean))
-        line_at = points[-1][0]
-        height = delay + slope * (line_at - board)
-        # The true line lies between what was sent and what was received.
-        gaps = [height + slope * (at - line_at) - low for at, low in self._sent]
+            slope = max(slowest, min(fastest, slope))
+        # Behind all points: so the steepest line is the highest there, and the flattest the lowest.
+        at = max(points[-1][0], lower[-1][0] if lower else 0)
+        height = _lowest(upper, slope, at)
+        highest = _lowest(upper, fastest, at)
+        lowest = -_lowest([(x, -y) for x, y in lower], -slowest, at)
         return ClockEstimate(
-            board_us=float(line_at),
-            host_us=line_at + height,
+            board_us=float(at),
+            host_us=at + height,
             rate=1.0 + slope,
-            uncertainty_us=max(0.0, min(gaps)) if gaps else float("inf"),
+            uncertainty_us=max(highest - height, height - lowest, 0.0) + _LINE_ERROR_US,
+            rate_uncertainty=max(fastest - slope, slope - slowest),
         )
 
 
-def _lower_hull(points: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    hull: list[tuple[int, int]] = []
+_Points: TypeAlias = list[tuple[int, int]]
+
+
+def _slopes_between(upper: _Points, lower: _Points) -> tuple[float, float]:
+    """Slopes of the lines below all `upper` and above all `lower` points: least, greatest."""
+    slowest, fastest = -_RATE_ERROR_MAX, _RATE_ERROR_MAX
+    for x, y in upper:
+        for x_low, y_low in lower:
+            if x > x_low:
+                fastest = min(fastest, (y - y_low) / (x - x_low))
+            elif x < x_low:
+                slowest = max(slowest, (y_low - y) / (x_low - x))
+    # Crossed where a clock did not run evenly: then nothing better is known.
+    return (slowest, fastest) if slowest <= fastest else (-_RATE_ERROR_MAX, _RATE_ERROR_MAX)
+
+
+def _lowest(points: _Points, slope: float, at: int) -> float:
+    """Height at `at` of the highest line with this slope that is below all points."""
+    return min((y + slope * (at - x) for x, y in points), default=float("inf"))
+
+
+def _lower_hull(points: _Points) -> _Points:
+    hull: _Points = []
     for x, y in points:
         while len(hull) >= 2:
             (x0, y0), (x1, y1) = hull[-2:]

@@ -27,6 +27,8 @@ __all__ = ["Pollable", "Session", "refused_error"]
 
 # Pollables are looked at at least this often, and Ctrl-C is noticed.
 _SLICE_US: Final = 20_000
+# Nobody read for this long: the program did something else, or the computer stalled.
+_AWAY_US: Final = 100_000
 _READ_REPEAT_US: Final = 100_000
 
 
@@ -85,6 +87,7 @@ class Session:
         self.pollables: list[Pollable] = list(pollables)
         self._session_id = secrets.randbelow(255) + 1 if session_id is None else session_id
         self._subscribers: list[Callable[[Event], None]] = []
+        self._read_up_to_us = transport.now_us()
 
     def __enter__(self) -> Self:
         return self
@@ -164,6 +167,7 @@ class Session:
             The link failed.
         """
         deadline_us = self.transport.now_us() + timeout_us
+        self._catch_up()
         while not self._turn(done):
             now_us = self.transport.now_us()
             if now_us >= deadline_us:
@@ -174,9 +178,26 @@ class Session:
             engine_us = self.engine.next_deadline_us
             if engine_us is not None:
                 wake_us = max(now_us, min(wake_us, engine_us))
-            received = self.transport.receive(wake_us)
-            if received is not None:
-                self.engine.receive(*received)
+            self._read(wake_us)
+            self._catch_up()
+
+    def _read(self, deadline_us: int) -> bool:
+        """Wait for bytes; return whether any came."""
+        received = self.transport.receive(deadline_us)
+        if received is None:
+            self._read_up_to_us = deadline_us
+            return False
+        self._read_up_to_us = received[1]
+        self.engine.receive(*received)
+        return True
+
+    def _catch_up(self) -> None:
+        """After a break, read what came meanwhile before anything counts as late or lost."""
+        now_us = self.transport.now_us()
+        if now_us - self._read_up_to_us < _AWAY_US:
+            return
+        while self._read(now_us + _SLICE_US):
+            pass
 
     def run_for(self, duration_us: int) -> None:
         """Run the link for a time."""

@@ -38,8 +38,9 @@ def test_resonator_half_a_percent_off(rate: float, offset_us: int, seed: int) ->
     for board_us in (end_us - 5_000_000, end_us, end_us + 1_000_000):
         true_us = offset_us + board_us * rate
         assert abs(estimate.to_host_us(board_us) - true_us) < 500
+        assert abs(estimate.to_host_us(board_us) - true_us) <= estimate.uncertainty_at_us(board_us)
         assert estimate.to_board_us(estimate.to_host_us(board_us)) == pytest.approx(board_us)
-    assert estimate.uncertainty_us < 1_000
+    assert estimate.uncertainty_us < 1_500
 
 
 def test_one_late_second_does_not_move_the_clock() -> None:
@@ -57,7 +58,8 @@ def test_exact_line_is_met_exactly() -> None:
         clock.add(board_us=20_000 * frame, received_us=20_000 * frame + 123)
         clock.add_sent(sent_us=20_000 * frame + 123, board_us=20_000 * frame)
     estimate = clock.estimate()
-    assert (estimate.rate, estimate.uncertainty_us) == (1.0, 0.0)
+    assert estimate.rate == 1.0
+    assert estimate.uncertainty_us <= 25, "what the resonator makes of a frame's bytes"
     assert estimate.to_host_us(0) == 123
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import pytest
 from tests.host.link.model import (
     POSE,
@@ -235,3 +237,56 @@ def test_refusals_in_a_row_cost_no_timeout() -> None:
     session.run_until(lambda: all(ticket.done for ticket in tickets), SECOND_US)
     assert [ticket.state for ticket in tickets] == [TicketState.REFUSED] * 2
     assert session.engine.statistics.timeouts == 0
+
+
+class RealTime(ModelTransport):
+    """Time passes without the host, and what came meanwhile waits with its time of arrival."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.arrived: deque[tuple[bytes, int]] = deque()
+
+    def pass_by(self, duration_us: int) -> None:
+        end_us = self.time_us + duration_us
+        while (item := super().receive(end_us)) is not None:
+            self.arrived.append(item)
+
+    def receive(self, deadline_us: int) -> tuple[bytes, int] | None:
+        return self.arrived.popleft() if self.arrived else super().receive(deadline_us)
+
+
+def test_a_program_may_do_something_else_for_ten_seconds() -> None:
+    """What had come meanwhile was not read before the silence was judged.
+
+    So a program that slept, computed or waited for its user for more than four
+    seconds lost a link on which nothing was wrong.
+    """
+    line = RealTime()
+    session = Session(line, session_id=7)
+    session.open()
+    line.pass_by(10 * SECOND_US)
+    assert session.request(Enable(pulse_ticks=POSE)).state is TicketState.EXECUTED
+    assert session.telemetry is not None
+    assert session.telemetry.frame * 20_000 > 10 * SECOND_US
+
+
+def test_a_callback_may_take_its_time() -> None:
+    """The same within a wait: the first of what had come was taken for the last."""
+    line = RealTime()
+    session = Session(line, session_id=7)
+    session.open()
+    asleep = iter([5 * SECOND_US])
+    session.subscribe(lambda _: line.pass_by(next(asleep, 0)))
+    session.run_for(10 * SECOND_US)
+
+
+def test_a_stalled_host_repeats_nothing_that_was_answered() -> None:
+    """A computer that stood still sent every command again whose receipt it had not read yet."""
+    line = RealTime()
+    session = Session(line, session_id=7)
+    session.open()
+    ticket = session.send(Enable(pulse_ticks=POSE))
+    line.pass_by(600_000)
+    session.run_until(lambda: ticket.done, SECOND_US)
+    assert session.engine.statistics.frames_retransmitted == 0
+    assert ticket.state is TicketState.EXECUTED
