@@ -153,6 +153,10 @@ fuzz: .venv/.dev ## fuzz the firmware for FUZZ_SECONDS a target, and note it in 
 	@.ci/need $(FUZZ_PACKAGES)
 	$(BIN)/python tests/fuzz/fuzz.py --seconds $(FUZZ_SECONDS) --jobs $(FUZZ_JOBS)
 
+.PHONY: line-stress
+line-stress: .venv/.dev ## a million commands over a bad line, noted in tests/system/link_runs.json
+	$(BIN)/python -m tests.system.link_stress --commands 1000000 --record
+
 .PHONY: avr
 avr: .venv/.dev firmware $(AVR_LIBRARY) ## the built firmware's tests, in a cycle-accurate UNO
 	$(BIN)/python -m pytest tests/avr

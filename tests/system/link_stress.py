@@ -3,9 +3,10 @@
 A witness sits between the simulated board and the bad line. Now and then a stop, a
 guarded move that trips or a broken sensor interrupts.
 
-    python -m tests.system.link_stress --commands 1000000 --rate 0.01 --record
+    python -m tests.system.link_stress --commands 100000 --rate 0.01
 
-`--record` appends what came out to `link_runs.json`, with date and commit.
+`--record` appends what came out to `link_runs.json`, with date and commit;
+`make line-stress` does so with a million.
 """
 
 from __future__ import annotations
