@@ -18,6 +18,7 @@ from theory_pictures import STYLE
 
 from setae import kinematics, packing, tendons, trajectory, volume, workspace
 from setae.config import load
+from setae.experiments.targets import combinations
 from setae.report import palette
 from setae.report import workspace as workspace_pictures
 from setae.servo import ServoModel
@@ -43,7 +44,7 @@ def holding(path: Path) -> None:
     """Where the spring rests for the paper's targets, and what hangs slack."""
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")
     where, slack = figure.subplots(1, 2, width_ratios=(1.25, 1))
-    arc = workspace_pictures.paper_targets()
+    arc = combinations()
     reach = workspace.check(arc, CONFIG, "paper")
     lost = reach.reachable & ~reach.holdable
     for model, colour in (("paper", palette.CONTACT), ("parallel", palette.PRESSURE)):

@@ -164,3 +164,28 @@ def tube_scene(config: Config, obstacle: Obstacle | None = None) -> Scene:
         obstacle=obstacle,
         box=box,
     )
+
+
+def open_scene(surface_below_mm: float | None = None) -> Scene:
+    """Place nothing within reach, or only a flat surface below the robot.
+
+    Parameters
+    ----------
+    surface_below_mm
+        How far below the origin of frame D the surface is; None: none.
+
+    Examples
+    --------
+    >>> open_scene().tube_inner_radius_mm, open_scene(127.0).box.edges_mm
+    (10000.0, (400.0, 400.0, 40.0))
+    """
+    box = None
+    if surface_below_mm is not None:
+        wide_mm, thick_mm = 400.0, 40.0
+        box = Box(
+            centre_mm=(0.0, 0.0, -surface_below_mm - thick_mm / 2),
+            edges_mm=(wide_mm, wide_mm, thick_mm),
+            yaw_rad=0.0,
+        )
+    # Every scene has walls; these are too far away to matter.
+    return Scene(tube_axis_mm=(0.0, 0.0, 0.0), tube_inner_radius_mm=10_000.0, box=box)

@@ -14,8 +14,9 @@ from rich.table import Table
 
 from setae import rig
 from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.runs import STOPPED, later, say, what_is_left, write_report
 from setae.config import Config
-from setae.errors import ExtraMissingError, InputError, SetaeError
+from setae.errors import InputError, SetaeError
 from setae.experiments.explore import (
     PAPER_DESCENTS_MM,
     Event,
@@ -94,7 +95,7 @@ def explore(
                 config=config,
                 seed=where.seed + number - 1,
                 scene=tube_scene(config, what),
-                stage=None if simulated else ManualStage(ask=_say),
+                stage=None if simulated else ManualStage(ask=say),
                 pollables=[interrupts],
             ) as opened,
         ):
@@ -121,55 +122,28 @@ def explore(
     except KeyboardInterrupt as interrupt:
         failures = getattr(interrupt, "__notes__", [])
         interrupt.__notes__ = [
-            *(["interrupted, but:", *failures] if failures else _STOPPED),
-            *_what_is_left(logs),
+            *(["interrupted, but:", *failures] if failures else STOPPED),
+            *what_is_left(logs),
         ]
         raise
     except SetaeError as error:
-        for line in _what_is_left(logs):
+        for line in what_is_left(logs):
             error.add_note(line)
         raise
     _print_table(results, paper=list(obstacles) == list(paper_obstacles(config)))
-    console.print(f"Logs: {folder()}", markup=False, soft_wrap=True)
+    say(f"Logs: {folder()}")
     if report:
         try:
-            _report(logs, folder())
+            write_report(logs, folder())
         except KeyboardInterrupt as interrupt:
-            interrupt.add_note(f"interrupted: the experiment is done. {_later(folder())}")
+            interrupt.add_note(f"interrupted: the experiment is done. {later(folder())}")
             raise
-
-
-_STOPPED = ["interrupted: robot and arm are stopped."]
-
-
-def _what_is_left(logs: Sequence[Path]) -> list[str]:
-    """What a run that ended early leaves, and what can be done with it."""
-    if not logs:
-        return []
-    return [f"What happened is in {logs[-1]}. {_later(logs[-1].parent)}"]
-
-
-def _later(folder: Path) -> str:
-    return f"`setae report {folder}` makes a report of it."
 
 
 # A person jogs the arm by hand between two steps.
 _MANUAL_TIMEOUT_S = 600.0
 # Taking the tube apart to fix a cube in it takes longer.
 _PLACE_TIMEOUT_S = 3600.0
-
-
-def _report(logs: Sequence[Path], folder: Path) -> None:
-    from setae import report
-
-    try:
-        path = report.write(logs, folder / "report.html")
-    except ExtraMissingError as error:
-        # The experiment itself is done, and `setae report` can follow.
-        text = f"No report: {error} {_later(folder)}"
-        console.print(text, style="yellow", markup=False, soft_wrap=True)
-        return
-    console.print(f"Report: {path}", markup=False, soft_wrap=True)
 
 
 def _obstacles(
@@ -214,13 +188,9 @@ def _ask_to_place(robot: Robot, what: Obstacle | None) -> None:
     )
     enter = Enter()
     enter.forget()
-    _say(f"{where} and bring the arm to its start, then press Enter.")
+    say(f"{where} and bring the arm to its start, then press Enter.")
     # In the robot's own loop: it is watched meanwhile, and Ctrl-C is heard.
     robot.wait(enter.pressed, timeout_s=_PLACE_TIMEOUT_S, what="the arm to be at its start")
-
-
-def _say(text: str) -> None:
-    console.print(text, markup=False, soft_wrap=True)
 
 
 class _Progress:

@@ -1,9 +1,10 @@
 """Reports: what a run's logs say, as a web page, pictures and tables.
 
-`write` is the way in. The modules: `trial` reads a log, `shapes` and `drawing`
-draw the robot, `pictures`, `html` and `tables` write the files, `paper` holds
-the paper's numbers. Matplotlib and Plotly come with the extra ``report`` and are
-imported when first needed.
+`write` is the way in. `explore` and `validation` are the reports of the two
+experiments, each with its page, pictures and tables; `paper` holds the paper's
+numbers. Of the exploration, `trial` reads a log, and `shapes` and `drawing` draw
+the robot. Matplotlib and Plotly come with the extra ``report`` and are imported
+when first needed.
 """
 
 from __future__ import annotations
@@ -11,19 +12,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from setae import record
+from setae.errors import LogError
 from setae.record import Log
-from setae.report import explore
+from setae.report import explore, files, validation
 
-__all__ = ["explore", "write"]
+__all__ = ["explore", "validation", "write"]
+
+_WRITERS = {"explore": explore.write, "validate": validation.write}
 
 
 def write(logs: str | Path | Iterable[str | Path | Log], path: str | Path) -> Path:
-    """Write the report of an exploration; `explore.write` with the page's own path.
+    """Write the report of an experiment, which its logs name.
 
     Parameters
     ----------
     logs
-        A folder with logs, one log, or several; each log holds one trial.
+        A folder with logs, one log, or several; all of one experiment.
     path
         The page to write, such as ``runs/explore-1/report.html``. Pictures and
         tables go into the same folder.
@@ -34,4 +39,12 @@ def write(logs: str | Path | Iterable[str | Path | Log], path: str | Path) -> Pa
         The page.
     """
     path = Path(path)
-    return explore.write(logs, path.parent, page=path.name).page
+    read = [log if isinstance(log, Log) else record.read(log) for log in files.logs_of(logs)]
+    kinds = {str(log.metadata.get("experiment") or "explore") for log in read}
+    if len(kinds) > 1:
+        raise LogError(
+            f"These logs are of different experiments: {', '.join(sorted(kinds))}.",
+            "Report each experiment's logs alone.",
+        )
+    writer = _WRITERS.get(kinds.pop(), explore.write)
+    return writer(read, path.parent, page=path.name).page

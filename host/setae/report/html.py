@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import base64
 import html
-import json
 import math
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
-from setae.report import drawing, extras, palette, paper, shapes
+from setae.report import drawing, extras, palette, paper, shapes, template
 from setae.report.pictures import floor_mm, origin_note
 from setae.report.tables import Comparison, compare
 from setae.report.trial import Trial
@@ -40,7 +38,7 @@ def page(trials: Sequence[Trial]) -> str:
     edges = {trial.cube.edge_mm for trial in trials if trial.cube}
     values = {
         "title": "Feeling the way down a tube",
-        "css": _file("page.css"),
+        "css": template.text("page.css"),
         "badges": _badges(trials),
         "step": f"{explore.step_mm:g} mm",
         "directions": str(len(directions)),
@@ -52,17 +50,12 @@ def page(trials: Sequence[Trial]) -> str:
         "compressed": f"{explore.compressed_length_mm:g} mm",
         "origin": _origin(trials),
         "source": html.escape(paper.source()),
-        "config": _config_text(first),
+        "config": template.config_text(first.log.metadata),
         "plotly": plotly.get_plotlyjs(),
-        "data": _json(_data(trials)),
-        "js": _file("page.js"),
+        "data": template.json_text(_data(trials)),
+        "js": template.text("page.js"),
     }
-    parts = _file("page.html").split("{{")
-    text = [parts[0]]
-    for part in parts[1:]:
-        name, rest = part.split("}}", 1)
-        text += [values[name], rest]
-    return "".join(text)
+    return template.fill("page.html", values)
 
 
 def finding(rows: Sequence[Comparison]) -> str:
@@ -199,16 +192,6 @@ def _origin(trials: Sequence[Trial]) -> str:
             rows.append((f"trial {trial.number}", f"not complete: {why}"))
     items = "".join(f"<dt>{html.escape(a)}</dt><dd>{html.escape(b)}</dd>" for a, b in rows)
     return f"<dl>{items}</dl>"
-
-
-def _config_text(trial: Trial) -> str:
-    config = trial.log.metadata.get("config")
-    if not config:
-        return ""
-    return (
-        "<details><summary>Configuration of the run</summary>"
-        f"<pre>{html.escape(str(config))}</pre></details>"
-    )
 
 
 # ---------------------------------------------------------------------------- data
@@ -354,24 +337,3 @@ def _pressure(trial: Trial) -> dict[str, Any]:
 
 def _packed(values: Any, kind: DTypeLike) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
-
-
-def _json(data: Any) -> str:
-    # "</" would end the script element that holds it.
-    text = json.dumps(_clean(data), separators=(",", ":"), allow_nan=False)
-    return text.replace("</", "<\\/")
-
-
-def _clean(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _clean(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_clean(item) for item in value]
-    if isinstance(value, float | np.floating | np.ndarray):
-        number = float(value)
-        return round(number, 5) if math.isfinite(number) else None
-    return value
-
-
-def _file(name: str) -> str:
-    return resources.files("setae.report.page").joinpath(name).read_text(encoding="utf-8")

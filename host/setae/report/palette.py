@@ -20,6 +20,8 @@ CLEAR = "#cfe0ec"
 BAND = "#f4d9a8"
 PRESSURE = "#2b5c8a"
 AGREES = "#1f7a4d"
+HEAT = ("#2b7bba", "#58a892", "#e0b43c", "#e07b1a", "#d4213d")
+"""From small to large, evenly spaced."""
 
 
 def direction(alpha_deg: float) -> str:
@@ -28,6 +30,19 @@ def direction(alpha_deg: float) -> str:
 
     red, green, blue = colorsys.hls_to_rgb((alpha_deg % 360.0) / 360.0, 0.90, 0.55)
     return f"#{round(red * 255):02x}{round(green * 255):02x}{round(blue * 255):02x}"
+
+
+def heat(share: float) -> str:
+    """Return the colour at a place on the scale `HEAT`, which runs from 0 to 1.
+
+    Examples
+    --------
+    >>> heat(0.0), heat(0.5), heat(7.0)
+    ('#2b7bba', '#e0b43c', '#d4213d')
+    """
+    place = min(max(share, 0.0), 1.0) * (len(HEAT) - 1)
+    low = min(int(place), len(HEAT) - 2)
+    return mix(HEAT[low], HEAT[low + 1], place - low)
 
 
 def mix(colour: str, other: str, share: float) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
+from setae.experiments.accuracy import Spread
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperTrial:
@@ -56,6 +58,50 @@ def trial_like(obstacle_below_tip_mm: float | None) -> PaperTrial | None:
         elif abs(theirs - obstacle_below_tip_mm) < 0.5:
             return trial
     return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperErrors:
+    """The paper's errors of one group of targets, in the bending plane.
+
+    Attributes
+    ----------
+    targets
+        How many.
+    distance
+        Of the distance from the target.
+    lateral, height
+        Of the sizes of the errors along x (or y) and z; None where it gives none.
+    """
+
+    targets: int
+    distance: Spread
+    lateral: Spread | None
+    height: Spread | None
+
+
+def validation() -> dict[str, PaperErrors]:
+    """The errors of the paper's five groups, and of all targets together as ``"all"``.
+
+    Examples
+    --------
+    >>> validation()["+X"].distance
+    Spread(mean_mm=5.47, sd_mm=3.48)
+    """
+    return {
+        group: PaperErrors(
+            targets=row["targets"],
+            distance=Spread(*row["distance"]),
+            lateral=Spread(*row["lateral"]) if "lateral" in row else None,
+            height=Spread(*row["height"]) if "height" in row else None,
+        )
+        for group, row in _data()["validation"]["groups"].items()
+    }
+
+
+def validation_source() -> str:
+    """Where those numbers come from."""
+    return str(_data()["validation"]["source"])
 
 
 def source() -> str:

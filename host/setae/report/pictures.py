@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from setae.report import drawing, extras, palette, shapes
+from setae.report import drawing, extras, palette, shapes, style
 from setae.report.drawing import View
 from setae.report.tables import compare
 from setae.report.trial import Contact, Direction, Level, Trial
@@ -18,39 +18,6 @@ FLOOR_BELOW_MM = 30.0
 RIM_MM = 10.0
 _MARGIN_MM = 74.0  # for the parts' names
 _ABOVE_MM = drawing.HOLDER_HEIGHT_MM + 30.0  # the arm above frame D
-
-_STYLE = {
-    "font.family": "DejaVu Sans",
-    "font.size": 10.5,
-    "text.color": palette.INK,
-    "axes.labelcolor": palette.INK,
-    "axes.edgecolor": palette.MUTED,
-    "axes.linewidth": 0.8,
-    "axes.titlesize": 12,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "xtick.color": palette.MUTED,
-    "ytick.color": palette.MUTED,
-    "figure.facecolor": palette.PAPER,
-    "savefig.facecolor": palette.PAPER,
-    "svg.hashsalt": "setae",
-}
-
-
-def _figure(width_in: float, height_in: float) -> Any:
-    """Make a figure that no window system knows of."""
-    return extras.load("matplotlib.figure").Figure(figsize=(width_in, height_in))
-
-
-def _style() -> Any:
-    return extras.load("matplotlib").rc_context(_STYLE)
-
-
-def _save(figure: Any, path: Path, dpi: int = 160) -> None:
-    # No version of matplotlib in the file: the same run gives the same bytes.
-    figure.savefig(path, dpi=dpi, metadata={"Software": None})
 
 
 def origin_note(trials: Sequence[Trial]) -> str:
@@ -141,8 +108,8 @@ def robot_picture(path: Path, trial: Trial, *, title: bool = True) -> None:
         return
     index, contact = moment(trial)
     floor = floor_mm([trial])
-    with _style():
-        figure = _figure(9.0, 7.6)
+    with style.used():
+        figure = style.figure(9.0, 7.6)
         axes = figure.add_axes((0.0, 0.0, 1.0, 0.885 if title else 1.0))
         draw_scene(axes, trial, index, floor, [contact] if contact else [], scale=1.25)
         _frame(axes, trial, floor, motion.arm_mm[index, 2] + _ABOVE_MM, margin_mm=_MARGIN_MM)
@@ -158,7 +125,7 @@ def robot_picture(path: Path, trial: Trial, *, title: bool = True) -> None:
                 0.04, 0.905, f"Trial {trial.number}, {origin_note([trial])}. Lengths are to scale.",
                 fontsize=10.5, color=palette.MUTED, va="center",
             )  # fmt: skip
-        _save(figure, path)
+        style.save(figure, path)
 
 
 def _frame(axes: Any, trial: Trial, floor: float, top_mm: float, *, margin_mm: float = 0.0) -> None:
@@ -228,8 +195,8 @@ def pressure_picture(path: Path, trial: Trial) -> None:
         (level for level in trial.levels if any(d.touched for d in level.directions)),
         trial.levels[-1] if trial.levels else None,
     )
-    with _style():
-        figure = _figure(11.0, 6.6)
+    with style.used():
+        figure = style.figure(11.0, 6.6)
         whole, close = figure.subplots(2, 1, height_ratios=(1.0, 1.25))
         figure.subplots_adjust(left=0.075, right=0.985, top=0.8, bottom=0.085, hspace=0.5)
         figure.text(0.02, 0.955, "What the bristle felt", fontsize=17, weight="bold", va="center")
@@ -260,7 +227,7 @@ def pressure_picture(path: Path, trial: Trial) -> None:
         figure.legend(
             handles, labels, loc="upper right", bbox_to_anchor=(0.99, 0.985), ncols=3, frameon=False
         )
-        _save(figure, path)
+        style.save(figure, path)
 
 
 def _name_direction(axes: Any, trial: Trial, direction: Direction) -> None:
@@ -328,9 +295,9 @@ def _pressure_axes(axes: Any, trial: Trial, start_us: int, end_us: int) -> None:
 def directions_picture(path: Path, trials: Sequence[Trial]) -> None:
     """Draw, per trial, a rose of the directions felt at each depth; red where it touched."""
     depths = sorted({level.descent_mm for trial in trials for level in trial.levels})
-    with _style():
+    with style.used():
         # Three roses' width at least, or the line below the title doesn't fit.
-        figure = _figure(2.9 * max(len(trials), 3) + 0.4, 4.5)
+        figure = style.figure(2.9 * max(len(trials), 3) + 0.4, 4.5)
         figure.text(0.02, 0.93, "Where the bristle touched", fontsize=17, weight="bold")
         figure.text(
             0.02, 0.865,
@@ -349,7 +316,7 @@ def directions_picture(path: Path, trials: Sequence[Trial]) -> None:
                 ha="center", fontsize=10.5, weight="bold",
             )  # fmt: skip
         _legend(figure)
-        _save(figure, path)
+        style.save(figure, path)
 
 
 def _legend(figure: Any) -> None:
@@ -404,8 +371,8 @@ def _rose(axes: Any, trial: Trial, depths: Sequence[float]) -> None:
 
 def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
     """Show how far down each trial went, beside the paper's."""
-    with _style():
-        figure = _figure(9.0, 1.6 + 0.72 * len(trials))
+    with style.used():
+        figure = style.figure(9.0, 1.6 + 0.72 * len(trials))
         axes = figure.add_axes((0.22, 0.17, 0.745, 0.62))
         figure.text(
             0.02, 0.935, "How deep it went before it stopped", fontsize=17, weight="bold",
@@ -423,7 +390,7 @@ def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
             frameon=False,
             fontsize=9.5,
         )
-        _save(figure, path)
+        style.save(figure, path)
 
 
 def _trials_axes(axes: Any, trials: Sequence[Trial]) -> None:
@@ -480,8 +447,8 @@ def overview_picture(path: Path, trials: Sequence[Trial]) -> None:
         return
     index, contact = moment(trial)
     floor = floor_mm([trial])
-    with _style():
-        figure = _figure(13.2, 6.9)
+    with style.used():
+        figure = style.figure(13.2, 6.9)
         scene = figure.add_axes((0.0, 0.02, 0.53, 0.96))
         draw_scene(scene, trial, index, floor, [contact] if contact else [], scale=1.1)
         _frame(scene, trial, floor, motion.arm_mm[index, 2] + _ABOVE_MM, margin_mm=_MARGIN_MM)
@@ -506,7 +473,7 @@ def overview_picture(path: Path, trials: Sequence[Trial]) -> None:
             )  # fmt: skip
             felt.set_xlabel("time since the trial began (s)")
         figure.text(0.985, 0.012, origin_note(trials), fontsize=9, color=palette.MUTED, ha="right")
-        _save(figure, path, dpi=130)
+        style.save(figure, path, dpi=130)
 
 
 # ------------------------------------------------------------------------ animation
@@ -520,9 +487,9 @@ def animation(path: Path, trial: Trial, *, frames: int = 96, width_px: int = 560
     image = extras.load("PIL.Image")
     floor = floor_mm([trial])
     images = []
-    with _style():
+    with style.used():
         for index in _story(trial, frames):
-            figure = _figure(5.2, 5.2)
+            figure = style.figure(5.2, 5.2)
             axes = figure.add_axes((0.0, 0.0, 1.0, 0.93))
             now_us = int(motion.time_us[index])
             touched = [c for c in trial.contacts if c.time_us <= now_us]

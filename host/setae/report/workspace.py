@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import html
-import json
 import math
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +13,8 @@ import numpy.typing as npt
 from setae import volume
 from setae.arc import Arc, FloatArray
 from setae.config import Config
-from setae.report import extras, palette
-from setae.report.pictures import _figure, _save, _style
+from setae.experiments.targets import combinations
+from setae.report import extras, palette, style, template
 from setae.volume import Fate, FateArray, Volumes
 from setae.workspace import check
 
@@ -176,8 +174,8 @@ def _shaded(quads: FloatArray, colours: list[str]) -> list[str]:
 
 def picture(path: Path, config: Config, model: str, measured: Volumes) -> Path:
     """Draw the body with a quarter cut out, and two sections."""
-    with _style():
-        figure = _figure(14.6, 5.2)
+    with style.used():
+        figure = style.figure(14.6, 5.2)
         grid = figure.add_gridspec(
             1,
             3,
@@ -189,15 +187,15 @@ def picture(path: Path, config: Config, model: str, measured: Volumes) -> Path:
             wspace=0.2,
         )
         _body(figure.add_subplot(grid[0], projection="3d"), config, model)
-        _section(figure.add_subplot(grid[1]), config, model, 0.0, targets=True)
-        _section(figure.add_subplot(grid[2]), config, model, math.pi / 4)
+        draw_section(figure.add_subplot(grid[1]), config, model, 0.0, targets=True)
+        draw_section(figure.add_subplot(grid[2]), config, model, math.pi / 4)
         figure.text(
             0.03, 0.955, "Where the spring’s top can be", fontsize=15, fontweight="bold", va="top"
         )
         figure.text(0.03, 0.895, finding(measured, model), fontsize=10.5, va="top",
                     color=palette.MUTED)  # fmt: skip
         _legend(figure, measured)
-        _save(figure, path)
+        style.save(figure, path)
     return path
 
 
@@ -234,9 +232,10 @@ def _body(axes: Any, config: Config, model: str) -> None:
         axis._axinfo["grid"].update(color=palette.GRID, linewidth=0.6)
 
 
-def _section(
+def draw_section(
     axes: Any, config: Config, model: str, alpha_rad: float, *, targets: bool = False
 ) -> None:
+    """Draw what becomes of the poses in the plane of α, and in that of α + 180°."""
     colors = extras.load("matplotlib.colors")
     kinds = list(Fate)
     for turn in (0.0, math.pi):
@@ -262,14 +261,8 @@ def _section(
     axes.plot([0, 0], axes.get_ylim(), color=palette.PAPER, linewidth=0.8)
 
 
-def paper_targets() -> Arc:
-    """The paper's 63 combinations of height and bending, towards α = 0."""
-    z, theta = np.meshgrid(np.arange(40.0, 71.0, 5.0), np.radians(np.arange(10, 91, 10)))
-    return Arc.from_angles(length_mm=z * theta / np.sin(theta), theta_rad=theta, alpha_rad=0.0)
-
-
 def _targets(axes: Any, config: Config, model: str) -> None:
-    arc = paper_targets()
+    arc = combinations()
     reach = check(arc, config, model)
     top = arc.top_mm
     for held, face in ((True, palette.INK), (False, palette.PAPER)):
@@ -309,21 +302,16 @@ def page(path: Path, config: Config, model: str, measured: Volumes) -> Path:
     """
     plotly = extras.load("plotly.offline")
     values = {
-        "css": _file("page.css"),
+        "css": template.text("page.css"),
         "finding": html.escape(finding(measured, model)),
         "table": _table(measured),
         "model": html.escape(model),
         "config": html.escape(config.to_toml()),
         "plotly": plotly.get_plotlyjs(),
-        "data": json.dumps(_data(config, model, measured), separators=(",", ":")),
-        "js": _file("workspace.js"),
+        "data": template.json_text(_data(config, model, measured)),
+        "js": template.text("workspace.js"),
     }
-    parts = _file("workspace.html").split("{{")
-    text = [parts[0]]
-    for part in parts[1:]:
-        name, rest = part.split("}}", 1)
-        text += [values[name], rest]
-    path.write_text("".join(text), encoding="utf-8")
+    path.write_text(template.fill("workspace.html", values), encoding="utf-8")
     return path
 
 
@@ -378,7 +366,3 @@ def _data(config: Config, model: str, measured: Volumes) -> dict[str, Any]:
         "ink": palette.INK,
         "muted": palette.MUTED,
     }
-
-
-def _file(name: str) -> str:
-    return resources.files("setae.report.page").joinpath(name).read_text(encoding="utf-8")

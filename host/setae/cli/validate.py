@@ -1,0 +1,353 @@
+"""`setae validate`: how exactly the robot goes where it is sent, on the paper's targets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+from rich.box import SIMPLE
+from rich.table import Table
+
+from setae import record, rig, tendons
+from setae.arc import FloatArray
+from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.runs import later, say, what_is_left, write_report
+from setae.config import Config
+from setae.errors import InputError, SetaeError
+from setae.experiments import positions as measurements
+from setae.experiments import runs, view
+from setae.experiments.accuracy import Pose, Spread, by_group
+from setae.experiments.explore import Event
+from setae.experiments.targets import Target, choose, commanded_lengths_mm, paper_targets
+from setae.experiments.validate import Noise, measured, validate
+from setae.robot import Robot
+from setae.scene import open_scene
+from setae.stage import Enter
+
+Flag = Annotated[bool, Parameter(negative="")]
+Several = Annotated[list[str] | None, Parameter(negative="")]
+
+# Somebody takes a picture of each pose.
+_PICTURE_TIMEOUT_S = 3600.0
+
+
+@app.command(name="validate")
+def validate_command(
+    *,
+    model: Several = None,
+    targets: int | None = None,
+    positions: Several = None,
+    frame: Path | None = None,
+    noise_mm: float = 0.0,
+    noise_seed: int = 0,
+    out: Path | None = None,
+    resume: Flag = False,
+    force: Flag = False,
+    report: bool = True,
+    list_targets: Annotated[bool, Parameter(name="--list", negative="")] = False,
+    accept_jump: Flag = False,
+    where: Where | None = None,
+) -> None:
+    """Send the robot to the paper's 145 targets, and compare where it comes to.
+
+    With --sim the simulator says where it is. A real robot waits at each target for a
+    picture; the positions measured in them come in a second call, with --positions and
+    the same --out. Both write logs, tables and one report into the folder --out.
+
+    Parameters
+    ----------
+    model
+        Tendon model: paper, parallel or taut. Several times: one after the other, side
+        by side in the report. Without it the configuration's.
+    targets
+        Only so many targets, evenly spread over the groups.
+    positions
+        File with measured positions: columns target, x_mm, y_mm, z_mm, or ImageJ's
+        table of results. GROUP=FILE for one whose rows are a group's targets in their
+        order, such as +X=plus_x.csv. Several times: several files.
+    frame
+        TOML file with scale and axes of ImageJ's pictures.
+    noise_mm
+        Standard deviation of noise that is added to simulated positions, along each axis.
+    noise_seed
+        Seed of that noise.
+    out
+        Folder for logs and report; the default is the next free runs/validate-N.
+    resume
+        Go on with a run in --out that ended early.
+    force
+        Use --out though it holds files; logs of the same names are replaced.
+    report
+        Write the report.
+    list_targets
+        Print all targets with their positions and tendon lengths, and end.
+    accept_jump
+        Enable the servos though nobody knows where they are: the first pulse may move
+        them at full speed.
+    where
+        Which robot.
+    """
+    where = where or Where()
+    config = where.load()
+    models = [tendons.model(name).name for name in model or [config.motion.model]]
+    if len(set(models)) < len(models):
+        raise InputError("A model is named twice.", "Give each once.")
+    wanted = paper_targets(config)
+    if targets is not None:
+        wanted = choose(wanted, targets)
+    if list_targets:
+        _list(wanted, config, models)
+        return
+    noise = Noise(sd_mm=noise_mm, seed=noise_seed)
+    if positions:
+        folder = _import(positions, frame, models, out, config, force=force)
+    else:
+        if frame is not None:
+            raise InputError("--frame belongs to --positions.", "Give both, or none.")
+        if noise.sd_mm and not where.simulated:
+            raise InputError("--noise-mm is for simulated positions.", "Leave it out.")
+        if resume and out is None:
+            raise InputError("--resume needs the folder of the run.", "Give it as --out.")
+        drive = _Drive(where, config, noise, out, resume=resume, force=force)
+        folder = drive.all(models, wanted, accept_jump=accept_jump)
+    logs = sorted(folder.glob("*.mcap"))
+    _print_runs(runs.read(record.read(log) for log in logs))
+    say(f"Logs: {folder}")
+    if report and any(run.poses for run in runs.read(record.read(log) for log in logs)):
+        try:
+            write_report(logs, folder)
+        except KeyboardInterrupt as interrupt:
+            interrupt.add_note(f"interrupted: the experiment is done. {later(folder)}")
+            raise
+
+
+class _Drive:
+    """Drives the robot to targets, one log a model."""
+
+    def __init__(
+        self,
+        where: Where,
+        config: Config,
+        noise: Noise,
+        out: Path | None,
+        *,
+        resume: bool,
+        force: bool,
+    ) -> None:
+        self._where = where
+        self._config = config
+        self._noise = noise
+        self._resume = resume
+        self._force = force
+        self._out = out
+        self._folder: Path | None = None
+        self._logs: list[Path] = []
+
+    def all(self, models: Sequence[str], targets: Sequence[Target], *, accept_jump: bool) -> Path:
+        """Run every model; the folder with the logs."""
+        try:
+            for model in models:
+                left = [target for target in targets if target.label not in self._done(model)]
+                if left:
+                    self._one(model, left, accept_jump=accept_jump)
+                else:
+                    say(f"Model {model}: all {len(targets)} targets are done already.")
+        except KeyboardInterrupt as interrupt:
+            failures = getattr(interrupt, "__notes__", [])
+            stopped = ["interrupted: the robot is stopped."]
+            interrupt.__notes__ = [
+                *(["interrupted, but:", *failures] if failures else stopped),
+                *self._what_is_left(),
+            ]
+            raise
+        except SetaeError as error:
+            for line in self._what_is_left():
+                error.add_note(line)
+            raise
+        return self._where_to()
+
+    def _what_is_left(self) -> list[str]:
+        if not self._logs:
+            return []
+        again = f"`setae validate --resume --out {self._logs[-1].parent}` with the same options"
+        return [*what_is_left(self._logs), f"{again} goes on with the other targets."]
+
+    def _where_to(self) -> Path:
+        if self._folder is None:
+            self._folder = new_folder("validate", self._out, force=self._force or self._resume)
+        return self._folder
+
+    def _done(self, model: str) -> set[str]:
+        if not self._resume:
+            return set()
+        found = runs.read(record.read(log) for log in sorted(self._where_to().glob("*.mcap")))
+        for run in found:
+            if run.model == model:
+                if run.config != self._config:
+                    raise InputError(
+                        f"The run in {self._where_to()} had another configuration.",
+                        "Resume it with the same --config and --plant, or begin a new one.",
+                    )
+                return set(run.visited)
+        return set()
+
+    def _log(self, model: str) -> Path:
+        log = self._where_to() / f"{model}.mcap"
+        if self._resume:
+            number = 2
+            while log.exists():
+                log = log.with_name(f"{model}-{number}.mcap")
+                number += 1
+        elif self._force:
+            log.unlink(missing_ok=True)
+        return log
+
+    def _one(self, model: str, targets: Sequence[Target], *, accept_jump: bool) -> None:
+        with (
+            interrupts.caught(),
+            rig.open(
+                self._where.url,
+                config=self._config,
+                seed=self._where.seed,
+                scene=open_scene(),
+                pollables=[interrupts],
+            ) as opened,
+        ):
+            log = self._log(model)
+            recorder = opened.record(
+                log,
+                metadata={
+                    "experiment": runs.EXPERIMENT,
+                    "model": model,
+                    "noise_sd_mm": self._noise.sd_mm,
+                    "noise_seed": self._noise.seed,
+                },
+            )
+            self._logs.append(log)
+            opened.robot.enable(accept_jump=accept_jump)
+            with console.status("") as status:
+                count = 0
+
+                def on_event(event: Event) -> None:
+                    nonlocal count
+                    recorder.experiment(event.time_us, event.name, event.data)
+                    if event.name == "target":
+                        count += 1
+                        status.update(f"Model {model}: {count} of {len(targets)} targets")
+
+                validate(
+                    opened.robot, targets, self._measure(opened, len(targets)),
+                    model=model, on_event=on_event,
+                )  # fmt: skip
+
+    def _measure(self, opened: rig.Rig, count: int) -> Callable[[Target], FloatArray | None]:
+        world = opened.world
+        if world is None:
+            return _ask_for_picture(opened.robot, count)
+
+        def look(target: Target) -> FloatArray:
+            return np.asarray(world.truth().backbone_mm[-1] + self._noise.on(target))
+
+        return look
+
+
+def _ask_for_picture(robot: Robot, count: int) -> Callable[[Target], None]:
+    enter = Enter()
+    number = 0
+
+    def ask(target: Target) -> None:
+        nonlocal number
+        number += 1
+        enter.forget()
+        x, y, z = target.position_mm
+        say(
+            f"{number} of {count}: {target.label}, commanded ({x:.1f}, {y:.1f}, {z:.1f}) mm. "
+            "Take the picture, then press Enter."
+        )
+        robot.wait(enter.pressed, timeout_s=_PICTURE_TIMEOUT_S, what="the picture to be taken")
+
+    return ask
+
+
+def _import(
+    files: Sequence[str],
+    frame: Path | None,
+    models: Sequence[str],
+    out: Path | None,
+    config: Config,
+    *,
+    force: bool,
+) -> Path:
+    """Turn measured positions into a log of their own, beside that of the drive if there is one."""
+    if len(models) > 1:
+        raise InputError(
+            "The positions were measured under one tendon model.", "Give one --model a call."
+        )
+    every = paper_targets(config)
+    seen = view.load(frame) if frame is not None else None
+    poses = measurements.merged([measurements.read(file, every, seen) for file in files])
+    # The run that was driven before may be there, and is gone on with.
+    drove = out is not None and (out / f"{models[0]}.mcap").exists()
+    folder = new_folder("validate", out, force=force or drove)
+    log = folder / f"{models[0]}-measured.mcap"
+    if force:
+        log.unlink(missing_ok=True)
+    measured(log, poses, config, model=models[0], files=[Path(file).name for file in files])
+    say(f"{len(poses)} of {len(every)} targets measured.")
+    return folder
+
+
+# ---------------------------------------------------------------------------- printing
+
+
+def _list(targets: Sequence[Target], config: Config, models: Sequence[str]) -> None:
+    for model in models:
+        lengths, _ = commanded_lengths_mm(targets, config, model)
+        print(
+            "target,x_mm,y_mm,z_mm," + ",".join(f"length_{i}_mm" for i in range(lengths.shape[1]))
+        )
+        for target, row in zip(targets, lengths, strict=True):
+            values = [*target.position_mm, *row]
+            print(f"{target.label}," + ",".join(f"{value:.3f}" for value in values))
+
+
+def _print_runs(found: Sequence[runs.Run]) -> None:
+    for run in found:
+        if run.poses:
+            say(f"Model {run.model}: {len(run.poses)} targets, {run.source}.")
+            say("Errors in mm, mean±SD; in the bending plane, but for the last column:")
+            console.print(_table(run.poses))
+        else:
+            say(
+                f"Model {run.model}: {len(run.visited)} targets driven, none measured. Measure "
+                "the pictures, then give them with --positions and the same --out."
+            )
+
+
+def _table(poses: Sequence[Pose]) -> Table:
+    from setae.report import paper
+
+    theirs = paper.validation()
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
+    for name in ("group", "n", "distance", "paper", "x or y", "z", "3D"):
+        table.add_column(name, justify="left" if name == "group" else "right")
+    for group, ours in by_group(poses).items():
+        table.add_row(
+            group,
+            str(ours.targets),
+            spread(ours.in_plane),
+            spread(theirs[group].distance) if group in theirs else "",
+            *(spread(part) for part in (ours.lateral, ours.height, ours.space)),
+        )
+    return table
+
+
+def spread(value: Spread | None) -> str:
+    """Mean ± SD, such as 4.32±2.73."""
+    if value is None or np.isnan(value.mean_mm):
+        return "–"
+    sd = "" if np.isnan(value.sd_mm) else f"±{value.sd_mm:.2f}"
+    return f"{value.mean_mm:.2f}{sd}"

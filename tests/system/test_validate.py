@@ -1,0 +1,206 @@
+"""`setae validate`: driving to targets, measuring, interrupting, resuming, reporting."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.system.test_explore_by_hand import board_at_a_port
+
+from setae import record, rig
+from setae.cli import main
+from setae.cli.common import interrupts
+from setae.config import load
+from setae.experiments import runs
+from setae.experiments.explore import Event
+from setae.experiments.targets import choose, paper_targets
+from setae.experiments.validate import Noise, validate
+from setae.link.session import Session
+from setae.scene import open_scene
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(["validate", *arguments])
+    captured = capsys.readouterr()
+    assert isinstance(ended.value.code, int)
+    return ended.value.code, captured.out, captured.err
+
+
+def runs_in(folder: Path) -> tuple[runs.Run, ...]:
+    return runs.read(record.read(log) for log in sorted(folder.glob("*.mcap")))
+
+
+def test_two_models_side_by_side_with_tables_and_one_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    code, printed, errors = run(
+        capsys, "--sim", "--targets", "12", "--model", "paper", "--model", "taut",
+        "--out", str(out),
+    )  # fmt: skip
+    assert code == 0, errors
+    assert "4.32±2.73" in printed  # the paper's own, beside
+    found = runs_in(out)
+    assert [one.model for one in found] == ["paper", "taut"]
+    assert all(one.complete and one.simulated for one in found)
+    count = len(choose(paper_targets(load()), 12))
+    assert [len(one.poses) for one in found] == [count, count]
+    # The shortest path inside the bore is nearer to what the plant's tendons do.
+    errors_mm = [np.mean([pose.in_plane_mm for pose in one.poses]) for one in found]
+    assert errors_mm[1] < errors_mm[0]
+    page = (out / "report.html").read_text()
+    assert "model paper" in page
+    assert "model taut" in page
+    data = json.loads((out / "validation.json").read_text())
+    assert data["runs"][0]["groups"]["all"]["targets"] == count
+    assert data["paper"]["compression"]["distance"] == {"mean_mm": 2.06, "sd_mm": 1.52}
+    lines = (out / "targets.csv").read_text().splitlines()
+    assert len(lines) == 1 + 2 * count
+    assert {path.stem for path in (out / "pictures").iterdir()} == {
+        "boxes", "bubbles", "places", "targets",
+    }  # fmt: skip
+
+
+def test_noise_is_added_as_asked_and_is_the_same_again() -> None:
+    target = paper_targets(load())[0]
+    noise = [Noise(sd_mm=0.5, seed=seed).on(target) for seed in (1, 1, 2)]
+    assert noise[0] == pytest.approx(noise[1])
+    assert noise[0] != pytest.approx(noise[2])
+    every = [Noise(sd_mm=0.5, seed=3).on(target) for target in paper_targets(load())]
+    assert np.std(every) == pytest.approx(0.5, rel=0.1)
+    assert Noise().on(target) == pytest.approx((0.0, 0.0, 0.0))
+
+
+def test_an_interrupted_run_keeps_what_it_has_and_goes_on_where_it_was(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "run"
+    arguments = ("--sim", "--targets", "8", "--out", str(out), "--no-report")
+    polls = 0
+
+    def press_ctrl_c(now_us: int) -> None:
+        nonlocal polls
+        polls += 1
+        if now_us > 6_000_000:
+            monkeypatch.undo()
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(interrupts, "poll", press_ctrl_c)
+    code, _, errors = run(capsys, *arguments)
+    assert code == 130
+    assert "--resume" in errors
+    assert len(errors.splitlines()) == 1
+    (before,) = runs_in(out)
+    assert not before.complete
+    assert 0 < len(before.poses) < 8
+    # A resumed run doesn't mix two configurations.
+    other = tmp_path / "other.toml"
+    other.write_text("[spring]\nbending_factor = 0.8\n")
+    code, _, errors = run(capsys, *arguments, "--resume", "--config", str(other))
+    assert code == 1
+    assert "another configuration" in errors
+    code, _, errors = run(capsys, *arguments, "--resume")
+    assert code == 0, errors
+    (after,) = runs_in(out)
+    assert after.complete
+    assert len(after.logs) == 2
+    wanted = [target.label for target in choose(paper_targets(load()), 8)]
+    assert sorted(after.visited) == sorted(wanted)
+    # What was measured before is still what it was.
+    kept = {pose.target.label: pose.position_mm for pose in after.poses}
+    for pose in before.poses:
+        assert kept[pose.target.label] == pytest.approx(pose.position_mm)
+
+
+def test_ctrl_c_stops_the_robot() -> None:
+    config = load()
+    events: list[Event] = []
+
+    def interrupt(_: object) -> None:
+        raise KeyboardInterrupt
+
+    with (
+        pytest.raises(KeyboardInterrupt),  # it has to leave the rig
+        rig.open("sim://", config=config, scene=open_scene()) as opened,
+    ):
+        opened.robot.enable()
+        validate(opened.robot, paper_targets(config)[:1], interrupt, on_event=events.append)
+    assert opened.robot.state.name == "STOPPED"
+    assert events[-1].name == "validate_aborted"
+
+
+def test_a_real_robot_waits_for_pictures_and_is_measured_by_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "run"
+    fast = tmp_path / "fast.toml"
+    fast.write_text("[motion]\nmove_speed_mm_s = 150.0\nrelax_speed_mm_s = 100.0\n")
+    keys = tmp_path / "keys"
+    keys.write_text("\n" * 5)
+    with board_at_a_port() as port, keys.open() as keyboard:
+        monkeypatch.setattr(sys, "stdin", keyboard)
+        code, printed, errors = run(
+            capsys, "--port", port, "--targets", "5", "--config", str(fast), "--out", str(out),
+            "--accept-jump",
+        )  # fmt: skip
+    assert code == 0, errors
+    assert "5 of 5: -Y z50 b10" in printed
+    assert "none measured" in printed
+    assert not (out / "report.html").exists()
+    driven = choose(paper_targets(load()), 5)
+    table = tmp_path / "measured.csv"
+    rows = []
+    for target in driven:
+        x, y, z = target.position_mm
+        rows.append(f"{target.label},{x},{y},{z + 2}")
+    table.write_text("\n".join(["target,x_mm,y_mm,z_mm", *rows]))
+    code, printed, errors = run(
+        capsys, "--positions", str(table), "--config", str(fast), "--out", str(out)
+    )
+    assert code == 0, errors
+    (found,) = runs_in(out)
+    assert [pose.height_mm for pose in found.poses] == pytest.approx([2.0] * 5)
+    assert "Measured on the robot" in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--sim", "--model", "straight"), "straight"),
+        (("--sim", "--targets", "3"), "too few"),
+        (("--sim", "--frame", "f.toml"), "--positions"),
+        (("--port", "x", "--noise-mm", "1"), "simulated"),
+        (("--sim", "--resume"), "--out"),
+        (("--sim", "--noise-mm", "-1"), "noise"),
+        (("--positions", "a.csv", "--model", "paper", "--model", "taut"), "one --model"),
+    ],
+)
+def test_contradictions_are_told_in_one_line_before_anything_moves(
+    arguments: tuple[str, ...],
+    words: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Session, "open", lambda _: pytest.fail("it connected"))
+    code, _, errors = run(capsys, *arguments)
+    assert code == 1
+    assert words in errors
+    assert len(errors.splitlines()) == 1
+    assert not (tmp_path / "runs").exists()
+
+
+def test_the_list_of_targets_is_a_table_that_can_be_filled_in(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code, printed, _ = run(capsys, "--list")
+    assert code == 0
+    lines = printed.splitlines()
+    assert len(lines) == 146
+    assert lines[0].startswith("target,x_mm,y_mm,z_mm,length_0_mm")
+    assert lines[1].startswith("C z30,0.000,0.000,30.000,30.000")
