@@ -19,6 +19,7 @@ from setae.experiments.explore import Event
 from setae.experiments.targets import choose, paper_targets
 from setae.experiments.validate import Noise, validate
 from setae.link.session import Session
+from setae.robot import Robot
 from setae.scene import open_scene
 
 
@@ -123,12 +124,15 @@ def test_ctrl_c_stops_the_robot() -> None:
     def interrupt(_: object) -> None:
         raise KeyboardInterrupt
 
+    def drive(robot: Robot) -> None:
+        robot.enable()
+        validate(robot, paper_targets(config)[:1], interrupt, on_event=events.append)
+
     with (
-        pytest.raises(KeyboardInterrupt),  # it has to leave the rig
+        pytest.raises(KeyboardInterrupt),
         rig.open("sim://", config=config, scene=open_scene()) as opened,
     ):
-        opened.robot.enable()
-        validate(opened.robot, paper_targets(config)[:1], interrupt, on_event=events.append)
+        drive(opened.robot)
     assert opened.robot.state.name == "STOPPED"
     assert events[-1].name == "validate_aborted"
 
