@@ -14,6 +14,12 @@ import serial
 from setae.errors import LinkLostError, PortBusyError, PortNotFoundError
 from setae_protocol.messages import BAUD
 
+try:
+    import fcntl
+    import termios
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
 __all__ = ["SerialTransport"]
 
 _READ_TIMEOUT_S: Final = 0.1
@@ -87,6 +93,7 @@ class SerialTransport:
         self._closing.set()
         if self._port.is_open:
             self._port.cancel_read()
+            _keep_others_out(self._port, keep=False)
         self._thread.join(timeout=2 * _READ_TIMEOUT_S)
         self._port.close()
 
@@ -108,6 +115,17 @@ class SerialTransport:
         return LinkLostError(f"The port {self._name} is gone ({error}).")
 
 
+def _keep_others_out(opened: serial.Serial, *, keep: bool = True) -> None:
+    """Have the system refuse other opens, or let them in again.
+
+    The lock that pyserial takes binds only who asks for it. A serial monitor doesn't,
+    and its opening alone would reset the board in mid-motion. Root may still open.
+    """
+    if fcntl is not None:  # Windows opens no port twice anyway
+        with contextlib.suppress(OSError):
+            fcntl.ioctl(opened.fileno(), termios.TIOCEXCL if keep else termios.TIOCNXCL)
+
+
 def _open(port: str) -> serial.Serial:
     try:
         opened = serial.Serial(
@@ -121,6 +139,7 @@ def _open(port: str) -> serial.Serial:
         # An FTDI chip holds bytes back for 16 ms otherwise. Other drivers can't, or needn't.
         with contextlib.suppress(OSError, ValueError, NotImplementedError, AttributeError):
             opened.set_low_latency_mode(True)
+        _keep_others_out(opened)
         return opened
     except serial.SerialException as error:
         number = error.errno or getattr(error.__context__, "errno", None)

@@ -63,6 +63,22 @@ def test_exact_line_is_met_exactly() -> None:
     assert estimate.to_host_us(0) == 123
 
 
+@pytest.mark.parametrize("rate", [0.995, 1.005])
+def test_the_first_seconds_claim_no_more_than_is_known(rate: float) -> None:
+    """The bound was the gap at one ping, as if the resonator were exact.
+
+    Two seconds into a session the clock was 10 ms off, and said 1 ms.
+    """
+    clock = Clock()
+    clock.add_sent(sent_us=-1_000, board_us=0)
+    for frame in range(95):
+        board_us = 20_000 * frame
+        clock.add(board_us=board_us, received_us=round(board_us * rate) + frame % 4_000)
+        estimate = clock.estimate()
+        error_us = estimate.to_host_us(board_us) - board_us * rate
+        assert abs(error_us) <= estimate.uncertainty_at_us(board_us)
+
+
 def test_nothing_known_is_an_error() -> None:
     assert not Clock().known
     with pytest.raises(ValueError, match="no frame"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import os
 import pty
 import tty
@@ -16,6 +17,8 @@ from setae.errors import LinkLostError, PortBusyError, PortNotFoundError
 from setae.link.serial_transport import SerialTransport
 
 LONG_US = 5_000_000
+# asm-generic/ioctls.h; Python does not name it.
+TIOCGEXCL = 0x80045440
 
 
 @pytest.fixture
@@ -67,6 +70,23 @@ def test_second_program_is_told_that_the_port_is_taken(terminal: tuple[int, str]
         SerialTransport(name)
     transport.close()
     SerialTransport(name).close()
+
+
+def test_a_program_that_takes_no_lock_is_kept_out_too(terminal: tuple[int, str]) -> None:
+    """A serial monitor asks for no lock. It opened the port, and that alone resets a board."""
+    _, name = terminal
+    monitor = os.open(name, os.O_RDWR | os.O_NOCTTY)  # was there before, and may ask
+
+    def others_are_refused() -> bool:
+        answer = fcntl.ioctl(monitor, TIOCGEXCL, bytes(4))
+        return any(answer)
+
+    assert not others_are_refused()
+    transport = SerialTransport(name)
+    assert others_are_refused()
+    transport.close()
+    assert not others_are_refused()
+    os.close(monitor)
 
 
 def test_pulled_cable(terminal: tuple[int, str]) -> None:
