@@ -13,7 +13,13 @@ ROOT: Final = HERE.parents[1]
 BUILD: Final = ROOT / "build" / "fuzz"
 LIBRARIES: Final = ROOT / "firmware" / "lib"
 
-TARGETS: Final = {"decoder": ("decoder.cpp",)}
+TARGETS: Final = {
+    "decoder": ("decoder.cpp",),
+    "board": (
+        "board.cpp", "script.cpp", "bench.cpp", "motion_watch.cpp", "state_watch.cpp",
+        "contact_watch.cpp", "line_watch.cpp",
+    ),
+}  # fmt: skip
 """What the fuzzer can drive, and the sources beside the firmware's."""
 
 MAX_BYTES: Final = {"decoder": 96, "board": 200}
@@ -88,7 +94,8 @@ def fuzzer(target: str) -> Path:
     """Build a target with libFuzzer and the sanitizers; only the firmware steers the fuzzer."""
     return build(
         SANITIZED, target, sources_of(target), tag="sanitized",
-        for_firmware=["-fsanitize=fuzzer-no-link"], for_program=["-fsanitize=fuzzer"],
+        for_firmware=["-fsanitize-coverage=inline-8bit-counters,pc-table"],
+        for_program=["-fsanitize=fuzzer"],
     )  # fmt: skip
 
 

@@ -26,6 +26,7 @@ def options(target: str) -> list[str]:
     return [
         f"-max_len={MAX_BYTES[target]}",
         "-timeout=5",
+        "-detect_leaks=0",
         "-print_final_stats=1",
         f"-artifact_prefix={BUILD}/crash-{target}-",
     ]

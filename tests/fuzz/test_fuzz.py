@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from tests.fuzz import building, fuzz
 
-RUNS = {"decoder": 20_000}
+RUNS = {"decoder": 20_000, "board": 3_000}
 
 
 @pytest.mark.parametrize("target", RUNS)

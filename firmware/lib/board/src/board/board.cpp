@@ -21,9 +21,11 @@ void Board::poll() {
   if (!started_)
     start();
   const BoardTime now = hal_.now();
-  if (now.frame != now_.frame)
+  if (now.frame != now_.frame) {
     begin_frame(now);
-  now_ = now;
+  } else {
+    now_ = now;
+  }
   receive();
   read_sensor();
   report();
@@ -142,7 +144,11 @@ void Board::put_out() {
   if (attached_ == kAllServos && current_attached_ == kAllServos) {
     limits_.confine(current_, next_);
   }
-  hal_.set_pulses(next_, attached_);
+  if (hal_.set_pulses(next_, attached_) == now_.frame)
+    return;
+  // The loop was late: another frame has begun, with the pulses of the one before it.
+  now_ = hal_.now();
+  history_.add(current_);
 }
 
 void Board::check_consistency() {

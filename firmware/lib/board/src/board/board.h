@@ -46,6 +46,8 @@ class Board {
   uint8_t epoch() const { return epoch_; }
 
  private:
+  friend struct BoardProbe;  // tests/fuzz
+
   // ---- board.cpp: time ----
   SETAE_OWN_FRAME void start();
   SETAE_OWN_FRAME void begin_frame(const BoardTime& now);

@@ -8,7 +8,7 @@
 
 namespace setae {
 
-class HostHal final : public Hal {
+class HostHal : public Hal {
  public:
   // What the servos are taken to have been left at: `pulse_free_us` of the
   // default robot, 850 us. A real board after a power cut knows nothing; see

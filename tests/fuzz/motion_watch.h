@@ -1,0 +1,40 @@
+// What the servos get, held against what the robot survives and what a host has allowed.
+#pragma once
+
+#include "machine.h"
+#include "step.h"
+
+namespace setae {
+namespace fuzz {
+
+class MotionWatch {
+ public:
+  void on_restart() { *this = MotionWatch(); }
+  void on_output(const Output& output, const protocol::SetLimits& limits);
+  void on_step(const Step& step, const Pulses& output);
+
+ private:
+  void allow(const Step& step);
+  void freeze();
+  bool toward_retract(const Output& output) const;
+
+  Output last_ = {};
+  bool frozen_ = false;       // until a resume
+  bool motion_mode_ = false;  // since the last output
+  bool attach_mode_ = false;
+  bool reflex_mode_ = false;
+  bool enabled_ = false;    // enable was sent since nothing was attached
+  bool segments_ = false;   // of the running epoch came
+  bool unwinding_ = false;  // relax came, or the hold timed out
+  bool guard_retracts_ = false;
+  Mode mode_ = Mode::kRelaxed;
+  uint32_t heard_frame_ = 0;
+  uint16_t retract_ticks_[protocol::kServos] = {};
+  uint16_t end_ticks_[protocol::kServos] = {};  // of the last accepted segment
+  bool stop_known_ = false;
+  uint8_t stop_number_ = 0;
+  uint8_t stop_session_ = 0;
+};
+
+}  // namespace fuzz
+}  // namespace setae
