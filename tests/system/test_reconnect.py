@@ -1,0 +1,278 @@
+"""Cable, board, host or a second program interrupt a session: what each side then does.
+
+`docs/reconnect.md` says the same as a table.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from tests.system.serial_board import SerialBoard
+
+from setae.errors import BoardResetError, LinkLostError, PortBusyError, RefusedError
+from setae.link.events import Event, TelemetryReceived, TicketState, Tripped
+from setae.link.lossy import Faults, LossyTransport
+from setae.link.serial_transport import SerialTransport
+from setae.link.session import Session
+from setae.sim import SimTransport, World
+from setae_protocol.messages import (
+    PRESSURE_LSB_PER_HPA,
+    Enable,
+    Guard,
+    GuardMessage,
+    Reflex,
+    Resume,
+    Segment,
+    Segments,
+    State,
+    Telemetry,
+    TripCause,
+)
+
+SECOND_US = 1_000_000
+START_TICKS = 1_800
+END_TICKS = 2_300
+DEAD = Faults(lose=1.0)
+
+
+def pose(ticks: int) -> tuple[int, int, int, int]:
+    return (ticks, ticks, ticks, ticks)
+
+
+def motion(epoch: int, *, frames: int, to_ticks: int = END_TICKS) -> Segments:
+    unused = Segment(0, pose(0))
+    return Segments(epoch, 1, (Segment(frames, pose(to_ticks)), unused, unused, unused, unused))
+
+
+class Shown:
+    """All telemetry and trips of a session."""
+
+    def __init__(self, session: Session) -> None:
+        self.telemetry: list[Telemetry] = []
+        self.trips: list[Tripped] = []
+        session.subscribe(self._on_event)
+
+    def _on_event(self, event: Event) -> None:
+        if isinstance(event, TelemetryReceived):
+            self.telemetry.append(event.telemetry)
+        elif isinstance(event, Tripped):
+            self.trips.append(event)
+
+    @property
+    def poses(self) -> set[tuple[int, int, int, int]]:
+        return {telemetry.pulse_ticks for telemetry in self.telemetry}
+
+
+def connect(world: World, session_id: int) -> tuple[Session, Shown]:
+    session = Session(SimTransport(world), session_id=session_id)
+    shown = Shown(session)
+    session.open()
+    return session, shown
+
+
+def enable(session: Session) -> None:
+    session.request(Enable(pulse_ticks=pose(START_TICKS)))
+    session.run_until(lambda: session.state is State.HOLDING, SECOND_US)
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    with World(seed=1) as made:
+        made.start()
+        yield made
+
+
+def pass_time(world: World, duration_us: int) -> None:
+    """Nobody listens."""
+    end_us = world.now_us + duration_us
+    while world.now_us < end_us:
+        world.run(end_us)
+
+
+# ------------------------------------------------------------------------- the host is gone
+
+
+def test_killed_host_board_ends_what_it_has_and_the_next_finds_it_holding(world: World) -> None:
+    first, _ = connect(world, 7)
+    enable(first)
+    first.request(motion(first.epoch, frames=50))
+    pass_time(world, 3 * SECOND_US)
+    second, shown = connect(world, 9)
+    assert second.state is State.HOLDING
+    second.run_for(SECOND_US)
+    assert shown.poses == {pose(END_TICKS)}, "played to its end, and nothing since"
+
+
+def test_new_host_in_mid_motion_freezes_it(world: World) -> None:
+    first, _ = connect(world, 7)
+    enable(first)
+    first.request(motion(first.epoch, frames=100))
+    pass_time(world, SECOND_US // 2)
+    second, shown = connect(world, 9)
+    second.run_for(3 * SECOND_US)
+    assert second.state is State.HOLDING
+    # The frame in which the session opened still shows its own pulses.
+    assert len(shown.poses) <= 2
+    assert shown.telemetry[-1].pulse_ticks[0] < END_TICKS
+
+
+def test_what_the_dead_host_stopped_stays_stopped_until_resume(world: World) -> None:
+    first, _ = connect(world, 7)
+    enable(first)
+    first.request(motion(first.epoch, frames=100))
+    first.stop()
+    second, shown = connect(world, 9)
+    assert second.state is State.STOPPED
+    with pytest.raises(RefusedError, match="stopped"):
+        second.request(motion(second.epoch, frames=50))
+    second.run_for(SECOND_US)
+    assert len(shown.poses) == 1
+    second.request(Resume(epoch=second.epoch))
+    second.request(motion(second.epoch, frames=100))
+    second.run_until(lambda: pose(END_TICKS) in shown.poses, 5 * SECOND_US)
+
+
+def test_trip_without_a_host_is_read_by_the_next_as_earlier(world: World) -> None:
+    """A guarded move ends by itself; nothing moves on before somebody has resumed."""
+    first, _ = connect(world, 7)
+    enable(first)
+    guard = GuardMessage(
+        epoch=first.epoch, threshold_raw=15 * PRESSURE_LSB_PER_HPA, consecutive=2,
+        deadline_frames=25, reflex=Reflex.HOLD, retract_ticks=pose(START_TICKS),
+        retract_slew_ticks=0,
+    )  # fmt: skip
+    first.request(guard)
+    first.request(motion(first.epoch, frames=200))
+    first.run_until(lambda: _armed(first), SECOND_US)
+    pass_time(world, 2 * SECOND_US)
+    second, shown = connect(world, 9)
+    second.run_for(SECOND_US)
+    assert [(trip.earlier, trip.record.cause) for trip in shown.trips] == [
+        (True, TripCause.DEADLINE)
+    ]
+    assert second.state is State.TRIPPED
+    assert len(shown.poses) == 1
+    with pytest.raises(RefusedError, match="tripped"):
+        second.request(motion(second.epoch, frames=50))
+
+
+def _armed(session: Session) -> bool:
+    return session.telemetry is not None and session.telemetry.guard is Guard.ARMED
+
+
+# ------------------------------------------------------------------- cable, and reset button
+
+
+def test_pulled_cable_ends_the_session_and_a_new_one_finds_the_board_holding(
+    world: World,
+) -> None:
+    line = LossyTransport(SimTransport(world), seed=1)
+    first = Session(line, session_id=7)
+    first.open()
+    enable(first)
+    ticket = first.send(motion(first.epoch, frames=50))
+    first.run_until(lambda: ticket.state is TicketState.EXECUTED, SECOND_US)
+    line.down_faults = line.up_faults = DEAD
+    unknown = first.send(motion(first.epoch, frames=50, to_ticks=START_TICKS))
+    with pytest.raises(LinkLostError):
+        first.run_for(10 * SECOND_US)
+    assert unknown.state is TicketState.FAILED
+    line.down_faults = line.up_faults = Faults()
+    second = Session(line, session_id=9)
+    shown = Shown(second)
+    second.open()
+    second.run_for(SECOND_US)
+    assert second.state is State.HOLDING
+    assert shown.poses == {pose(END_TICKS)}, "what was not confirmed is not sent again"
+
+
+def test_reset_board_is_limp_and_stays_so_for_the_next_session(world: World) -> None:
+    first, _ = connect(world, 7)
+    enable(first)
+    first.request(motion(first.epoch, frames=100))
+    world.reset_board()
+    with pytest.raises(BoardResetError, match="started anew"):
+        first.run_for(10 * SECOND_US)
+    second, shown = connect(world, 9)
+    assert second.state is State.RELAXED
+    assert second.hello is not None
+    assert second.hello.pose_known, "kept in memory that a reset leaves alone"
+    with pytest.raises(RefusedError, match="not_enabled"):
+        second.request(motion(second.epoch, frames=50))
+    second.run_for(SECOND_US)
+    assert {telemetry.attached for telemetry in shown.telemetry} == {0}
+
+
+def test_second_program_takes_over_and_the_first_is_told(world: World) -> None:
+    """Only where both got hold of the port, as through a network bridge."""
+    first, _ = connect(world, 7)
+    enable(first)
+    first.request(motion(first.epoch, frames=200))
+    second, shown = connect(world, 9)
+    with pytest.raises(BoardResetError, match="Another host opened session 9"):
+        first.run_for(SECOND_US)
+    second.run_for(SECOND_US)
+    assert second.state is State.HOLDING
+    assert len(shown.poses) <= 2
+
+
+# ------------------------------------------------------------------------ on a serial port
+
+HOST = """
+import sys
+from setae.link.serial_transport import SerialTransport
+from setae.link.session import Session
+from tests.system.test_reconnect import enable, motion
+session = Session(SerialTransport(sys.argv[1]), session_id=7)
+session.open()
+enable(session)
+session.request(motion(session.epoch, frames=200))
+print("moving", flush=True)
+session.run_for(60_000_000)
+"""
+
+
+def test_killed_process_leaves_port_and_robot_to_the_next() -> None:
+    with World(seed=1, parameters={"board.boot_us": 0}) as world:
+        world.start()
+        with SerialBoard(world) as board:
+            host = subprocess.Popen(
+                [sys.executable, "-c", HOST, board.port],
+                stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            )  # fmt: skip
+            assert host.stdout is not None
+            with host.stdout:
+                assert host.stdout.readline() == b"moving\n"
+            with pytest.raises(PortBusyError, match="Another program holds"):
+                SerialTransport(board.port)
+            host.send_signal(signal.SIGKILL)
+            host.wait()
+            board.forget_exclusive()
+            with Session(SerialTransport(board.port), session_id=9) as session:
+                shown = Shown(session)
+                session.open()
+                session.run_for(SECOND_US // 2)
+                assert session.state is State.HOLDING
+                assert len(shown.poses) <= 2
+
+
+def test_unplugged_port_is_lost_at_once_and_plugged_in_again_works() -> None:
+    with World(seed=1, parameters={"board.boot_us": 0}) as world:
+        world.start()
+        with SerialBoard(world) as board:
+            with Session(SerialTransport(board.port), session_id=7) as session:
+                session.open()
+                enable(session)
+                board.unplug()
+                with pytest.raises(LinkLostError, match="is gone"):
+                    session.run_for(3 * SECOND_US)
+            board.plug()
+            with Session(SerialTransport(board.port), session_id=9) as session:
+                session.open()
+                assert session.state is State.HOLDING
+                session.request(motion(session.epoch, frames=10, to_ticks=START_TICKS))
