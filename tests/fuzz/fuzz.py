@@ -65,14 +65,10 @@ def run_long(target: str, seconds: int, jobs: int, corpus: Path) -> bool:
 
 def record(target: str, executions: int, seconds: int, *, crashes: int) -> None:
     """Append a run to runs.json."""
-    commit = subprocess.run(
-        ["git", "describe", "--always", "--abbrev=10", "--dirty", "--exclude=*"],
-        cwd=ROOT, capture_output=True, text=True, check=True,
-    ).stdout.strip()  # fmt: skip
     entry = {
         "target": target,
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "commit": commit,
+        "commit": _commit(),
         "executions": executions,
         "seconds": seconds,
         "crashes": crashes,
@@ -81,6 +77,19 @@ def record(target: str, executions: int, seconds: int, *, crashes: int) -> None:
     lines = ",\n".join(json.dumps(item) for item in [*entries, entry])
     RUNS.write_text(f"[\n{lines}\n]\n")
     print(f"{target}: {executions} executions in {seconds} s, {crashes} crashes")
+
+
+def _commit() -> str:
+    """Return what was fuzzed; with a plus where sources differ from the commit."""
+
+    def git(*words: str) -> str:
+        command = ["git", *words]
+        return subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, check=True
+        ).stdout.strip()
+
+    changed = git("status", "--porcelain", "--", "firmware", "tests/fuzz", f":!{RUNS}")
+    return git("rev-parse", "--short=10", "HEAD") + ("+" if changed else "")
 
 
 def minimise(target: str, corpus: Path) -> None:
