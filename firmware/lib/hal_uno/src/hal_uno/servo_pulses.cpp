@@ -6,107 +6,99 @@
 
 // Timer1 runs at 0.5 us a tick. Its unit A walks through the frame (frame_start is F):
 //
-//   F              the pulses last set become this frame's
-//   F + rise 0     OC1A rises; + width: it falls
-//   F + rise 1     OC1B rises; + width: it falls (unit B, by itself)
-//   F + rise 2     OC2A rises; + width: it falls
-//   F + rise 3     OC2B rises; + width: it falls
+//   F               the pulses last set become this frame's
+//   F + kRise1      OC1A and OC1B rise; each falls by itself after its width
+//   (OC1A's fall)
+//   F + kRise2      OC2A and OC2B rise; each falls after its width
 //
-// Timer2 has 8 bits only: it matches every 128 us. So for its edges unit A wakes a little ahead
-// and arms the edge for Timer2's next match. Both timers start together and divide alike, hence
-// Timer2 equals the low byte of Timer1.
+// Timer2 has 8 bits only: it matches every 128 us. So units A and B of Timer1, which are free by
+// then, wake a little ahead of each of its edges and arm it for Timer2's next match. Both timers
+// start together and divide alike, hence Timer2 equals the low byte of Timer1.
+//
+// A handler arms an edge and never makes one. What comes too late even for that is counted, and
+// leaves a pulse out rather than letting it run on.
 
 namespace setae {
 namespace servo_pulses {
 namespace {
 
 constexpr uint16_t kFrameTicks = protocol::kServoFrameUs * protocol::kPulseTicksPerUs;
-constexpr uint16_t kSlotTicks = kFrameTicks / protocol::kServos;
-// From the frame's start to the first edge, and from waking to Timer2's edge: longer than the
-// longest time in which interrupts wait (28 us measured), shorter than Timer2's period.
+// Handlers wait 25 us at worst (see firmware/README.md). One that begins later than this counts as
+// late; the rest is for its own work.
+constexpr uint16_t kLateTicks = 90;
+constexpr uint16_t kWorkTicks = 25;
 constexpr uint16_t kAheadTicks = 120;
-constexpr uint16_t kFirstRise = 200;
-static_assert(kFirstRise > kAheadTicks, "");
+constexpr uint16_t kRise1 = kAheadTicks;
+constexpr uint16_t kWake2 =
+    kRise1 + protocol::kPulseTicksAbsoluteMax + kLateTicks + kWorkTicks;  // both have fallen
+constexpr uint16_t kRise2 = kWake2 + kAheadTicks;
+static_assert(kAheadTicks > kLateTicks + kWorkTicks, "an edge must be armed before it is due");
 static_assert(kAheadTicks < 256, "Timer2 would match too early");
 static_assert(protocol::kPulseTicksAbsoluteMin > 2 * kAheadTicks, "");
-static_assert(kFirstRise + protocol::kPulseTicksAbsoluteMax + kAheadTicks < kSlotTicks,
-              "a pulse must end before the next one begins");
+static_assert(kRise2 + protocol::kPulseTicksAbsoluteMax <= 5200 * protocol::kPulseTicksPerUs,
+              "all four pulses must end within 5.2 ms");
 
-constexpr uint16_t rise(uint8_t servo) {
-  return kFirstRise + servo * kSlotTicks;
-}
+// At its next match the unit lowers its pin, or raises it.
+constexpr uint8_t kLower1 = _BV(COM1A1) | _BV(COM1B1);
+constexpr uint8_t kLower2 = _BV(COM2A1) | _BV(COM2B1);
+constexpr uint8_t kRaise1A = _BV(COM1A0);
+constexpr uint8_t kRaise1B = _BV(COM1B0);
+constexpr uint8_t kRaise2A = _BV(COM2A0);
+constexpr uint8_t kRaise2B = _BV(COM2B0);
+constexpr uint8_t kRaise[protocol::kServos] = {kRaise1A, kRaise1B, kRaise2A, kRaise2B};
 
-constexpr uint8_t kSet1A = _BV(COM1A1) | _BV(COM1A0);
-constexpr uint8_t kSet1B = _BV(COM1B1) | _BV(COM1B0);
-constexpr uint8_t kSet2A = _BV(COM2A1) | _BV(COM2A0);
-constexpr uint8_t kSet2B = _BV(COM2B1) | _BV(COM2B0);
-
+// One frame's pulses as the handlers use them: from the frame's start, servos 0 and 1: when they
+// fall, 2 and 3: when to arm that.
 struct Output {
-  uint16_t width[protocol::kServos];
-  uint8_t attached;
+  uint16_t end[protocol::kServos];
+  uint8_t rise1;  // for TCCR1A: a servo without pulses is lowered once more
+  uint8_t rise2;  // for TCCR2A
 };
 
-Output wanted;   // written by the loop with interrupts off
-Output current;  // only the handlers touch it
+// One is this frame's, the other the loop may write, with interrupts off.
+Output outputs[2];
+Output* current = &outputs[0];
+Output* wanted = &outputs[0];
 uint32_t frame;
 uint16_t frame_start;
-uint8_t step_a;
-uint8_t step_b;
-
-bool attached(uint8_t servo) {
-  return (current.attached >> servo) & 1;
-}
-
-void clear_bits(volatile uint8_t& reg, uint8_t bits) {
-  reg &= static_cast<uint8_t>(~bits);
-}
-
-void start_frame() {
-  current = wanted;
-  frame_start += kFrameTicks;
-  ++frame;
-  OCR1A = frame_start + rise(0);
-  OCR1B = frame_start + rise(1);
-  step_b = 0;
-  if (attached(0))
-    TCCR1A |= kSet1A;
-  if (attached(1))
-    TCCR1A |= kSet1B;
-  // A detached pin falls back to its port bit, which is low.
-  if (!attached(2))
-    clear_bits(TCCR2A, kSet2A);
-  if (!attached(3))
-    clear_bits(TCCR2A, kSet2B);
-}
+uint8_t step;
+uint8_t late;
 
 }  // namespace
 
 void begin() {
-  clear_bits(PORTB, _BV(PORTB1) | _BV(PORTB2) | _BV(PORTB3));
-  clear_bits(PORTD, _BV(PORTD3));
-  DDRB |= _BV(DDB1) | _BV(DDB2) | _BV(DDB3);
-  DDRD |= _BV(DDD3);
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
     TIMSK0 = 0;  // the Arduino core's millis(), which nothing here uses
     TIMSK2 = 0;
-    TCCR1A = 0;
     TCCR1B = 0;
-    TCCR2A = 0;
     TCCR2B = 0;
+    // First the level, then the pin. Data sheet section 16.7: by a forced match.
+    TCCR1A = kLower1;
+    TCCR2A = kLower2;
+    TCCR1C = _BV(FOC1A) | _BV(FOC1B);
+    TCCR2B = _BV(FOC2A) | _BV(FOC2B);
+    PORTB &= static_cast<uint8_t>(~(_BV(PORTB1) | _BV(PORTB2) | _BV(PORTB3)));
+    PORTD &= static_cast<uint8_t>(~_BV(PORTD3));
+    DDRB |= _BV(DDB1) | _BV(DDB2) | _BV(DDB3);
+    DDRD |= _BV(DDD3);
     GTCCR = _BV(TSM) | _BV(PSRASY) | _BV(PSRSYNC);  // hold both prescalers
     TCNT1 = 0;
     TCNT2 = 0;
     TCCR1B = _BV(CS11);  // 16 MHz / 8
     TCCR2B = _BV(CS21);
+    current->rise1 = kLower1;
+    current->rise2 = kLower2;
     OCR1A = kFrameTicks;
-    TIFR1 = _BV(OCF1A) | _BV(OCF1B);
-    TIMSK1 = _BV(OCIE1A) | _BV(OCIE1B);
+    TIFR1 = _BV(OCF1A);
+    TIMSK1 = _BV(OCIE1A);
     GTCCR = 0;  // go, both in the same cycle
   }
 }
 
 uint32_t set(const Pulses& pulses, uint8_t attached) {
   Output output;
+  output.rise1 = kLower1;
+  output.rise2 = kLower2;
   for (uint8_t i = 0; i < protocol::kServos; ++i) {
     uint16_t ticks = pulses.ticks[i];
     // An edge in the past would come a timer's turn later: keep the handlers' order whatever
@@ -115,19 +107,24 @@ uint32_t set(const Pulses& pulses, uint8_t attached) {
       ticks = protocol::kPulseTicksAbsoluteMin;
     if (ticks > protocol::kPulseTicksAbsoluteMax)
       ticks = protocol::kPulseTicksAbsoluteMax;
-    output.width[i] = ticks;
+    output.end[i] = ticks + (i < 2 ? kRise1 : kWake2);
+    if ((attached >> i) & 1)
+      (i < 2 ? output.rise1 : output.rise2) |= kRaise[i];
   }
-  output.attached = attached;
   uint32_t running;
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    wanted = output;
+    wanted = current == &outputs[0] ? &outputs[1] : &outputs[0];
+    *wanted = output;
     running = frame;
   }
   return running;
 }
 
 void detach_from_interrupt() {
-  wanted.attached = 0;
+  Output* const next = current == &outputs[0] ? &outputs[1] : &outputs[0];
+  next->rise1 = kLower1;
+  next->rise2 = kLower2;
+  wanted = next;
 }
 
 BoardTime now() {
@@ -152,57 +149,75 @@ uint16_t ticks() {
   return count;
 }
 
+uint8_t late_armings() {
+  return late;
+}
+
 }  // namespace servo_pulses
 }  // namespace setae
 
 ISR(TIMER1_COMPA_vect) {
   using namespace setae::servo_pulses;
-  const uint16_t start = frame_start;
-  switch (step_a++) {
-    case 0:
-      start_frame();
-      break;
-    case 1:  // OC1A rose; the next match lowers it
-      clear_bits(TCCR1A, _BV(COM1A0));
-      OCR1A = start + rise(0) + current.width[0];
-      break;
-    case 2:
-      clear_bits(TCCR1A, kSet1A);
-      OCR1A = start + rise(2) - kAheadTicks;
-      break;
-    case 3:
+  const uint16_t woke = OCR1A;
+  const bool on_time = static_cast<uint16_t>(TCNT1 - woke) <= kLateTicks;
+  const uint8_t now_step = step;
+  step = now_step + 1;
+  if (now_step == 0) {  // woke at F
+    frame_start = woke;
+    ++frame;
+    current = wanted;
+    if (on_time) {
+      TCCR1A = current->rise1;
+      OCR1A = woke + kRise1;
+      OCR1B = woke + kRise1;
+      return;
+    }
+  } else if (now_step == 1) {  // both are up
+    TCCR1A = kLower1;
+    if (on_time) {
+      OCR1A = frame_start + current->end[0];
+      OCR1B = frame_start + current->end[1];
+      return;
+    }
+    TCCR1C = _BV(FOC1A) | _BV(FOC1B);
+  } else if (now_step == 2) {  // servo 0's pulse is over
+    if (on_time) {
+      OCR1A = frame_start + kWake2;
+      return;
+    }
+  } else if (now_step == 3) {
+    if (on_time) {
       // First where, then what: until then a match repeats the level that the pin has.
-      OCR2A = static_cast<uint8_t>(start + rise(2));
-      if (attached(2))
-        TCCR2A |= kSet2A;
-      OCR1A = start + rise(2) + current.width[2] - kAheadTicks;
-      break;
-    case 4:
-      OCR2A = static_cast<uint8_t>(start + rise(2) + current.width[2]);
-      clear_bits(TCCR2A, _BV(COM2A0));
-      OCR1A = start + rise(3) - kAheadTicks;
-      break;
-    case 5:
-      OCR2B = static_cast<uint8_t>(start + rise(3));
-      if (attached(3))
-        TCCR2A |= kSet2B;
-      OCR1A = start + rise(3) + current.width[3] - kAheadTicks;
-      break;
-    default:
-      OCR2B = static_cast<uint8_t>(start + rise(3) + current.width[3]);
-      clear_bits(TCCR2A, _BV(COM2B0));
-      OCR1A = start + kFrameTicks;
-      step_a = 0;
-      break;
+      OCR2A = static_cast<uint8_t>(woke + kAheadTicks);
+      OCR2B = static_cast<uint8_t>(woke + kAheadTicks);
+      TCCR2A = current->rise2;
+      OCR1A = frame_start + current->end[2];
+      OCR1B = frame_start + current->end[3];
+      TIFR1 = _BV(OCF1B);
+      TIMSK1 = _BV(OCIE1A) | _BV(OCIE1B);
+      return;
+    }
+  } else {
+    OCR2A = static_cast<uint8_t>(woke + kAheadTicks);
+    TCCR2A &= static_cast<uint8_t>(~kRaise2A);
+    if (!on_time)
+      TCCR2B |= _BV(FOC2A);
   }
+  if (!on_time)
+    ++late;
+  step = 0;
+  OCR1A = frame_start + kFrameTicks;
 }
 
+// Ahead of the fall of servo 3's pulse.
 ISR(TIMER1_COMPB_vect) {
   using namespace setae::servo_pulses;
-  if (step_b++ == 0) {
-    clear_bits(TCCR1A, _BV(COM1B0));
-    OCR1B = frame_start + rise(1) + current.width[1];
-  } else {
-    clear_bits(TCCR1A, kSet1B);
+  const uint16_t woke = OCR1B;
+  OCR2B = static_cast<uint8_t>(woke + kAheadTicks);
+  TCCR2A &= static_cast<uint8_t>(~kRaise2B);
+  if (static_cast<uint16_t>(TCNT1 - woke) > kLateTicks) {
+    TCCR2B |= _BV(FOC2B);
+    ++late;
   }
+  TIMSK1 = _BV(OCIE1A);
 }

@@ -19,6 +19,9 @@ uint32_t set(const Pulses& pulses, uint8_t attached);
 void detach_from_interrupt();
 
 BoardTime now();
+// Edges that could not be armed in time, since start, modulo 256: none, unless interrupts are off
+// for longer than they ever should be.
+uint8_t late_armings();
 // 0.5 us each; wraps after 32 ms.
 uint16_t ticks();
 
