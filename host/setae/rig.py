@@ -219,7 +219,7 @@ def open(  # noqa: A001  # rig.open() is what it does
     return Rig(robot, stage, scene, seed, world, foreign or plants.resolve(config.plant, seed))
 
 
-def _parameters(config: Config, seed: int) -> dict[str, float]:
+def simulator_parameters(config: Config, seed: int) -> dict[str, float]:
     """The named plant's, and what the configuration says itself above them."""
     return {**plants.parameters(config.plant, seed), **dict(config.simulator)}
 
@@ -239,7 +239,7 @@ def _seed(url: str, seed: int) -> int:
 def _world(config: Config, scene: Scene, seed: int, foreign: str | None = None) -> World:
     world = World(
         seed=seed,
-        parameters=_parameters(config, seed),
+        parameters=simulator_parameters(config, seed),
         plant=plugin.make(foreign, config, seed) if foreign else None,
     )
     world.add_tube(scene.tube_axis_mm, scene.tube_inner_radius_mm)
@@ -362,7 +362,7 @@ class Rig:
             "plant": self.plant,
             "plant_parameters": None
             if self.seed is None
-            else _parameters(self.robot.config, self.seed),
+            else simulator_parameters(self.robot.config, self.seed),
             "config": self.robot.config.to_toml(),
             "versions": {
                 "setae": setae.__version__,

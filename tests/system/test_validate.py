@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,12 @@ from setae import record, rig
 from setae.cli import main
 from setae.cli.common import interrupts
 from setae.config import load
-from setae.experiments import runs
+from setae.experiments import causes, runs
 from setae.experiments.explore import Event
 from setae.experiments.targets import choose, paper_targets
 from setae.experiments.validate import Noise, validate
 from setae.link.session import Session
+from setae.report.causes import picture, section
 from setae.robot import Robot
 from setae.scene import open_scene
 
@@ -208,3 +210,32 @@ def test_the_list_of_targets_is_a_table_that_can_be_filled_in(
     assert len(lines) == 146
     assert lines[0].startswith("target,x_mm,y_mm,z_mm,length_0_mm")
     assert lines[1].startswith("C z30,0.000,0.000,30.000,30.000")
+
+
+def test_causes_alone_and_mended_with_the_largest_gain_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    plant = tmp_path / "plant.toml"
+    # One large imperfection, and one so small that nobody would notice.
+    plant.write_text('[simulator]\n"tendon.offset_mm_0" = 3.0\n"tendon.winding_error_1" = 0.001\n')
+    code, printed, errors = run(
+        capsys, "--sim", "--config", str(plant), "--targets", "5", "--causes", "--no-report",
+        "--out", str(out),
+    )  # fmt: skip
+    assert code == 0, errors
+    assert "mending gains" in printed
+    effects = causes.effects(record.read(out / "causes.mcap"))
+    assert effects[0].cause == "zero offsets"
+    assert effects[0].gains_mm > 1.0
+    by_name = {effect.cause: effect for effect in effects}
+    assert abs(by_name["winding gain"].adds_mm) < 0.1
+    assert {"servo dead band", "weight and load", "tendon model taut"} <= by_name.keys()
+    assert "zero offsets" in section(effects, _picture(tmp_path, effects))
+    code, _, errors = run(capsys, "--port", "nowhere", "--causes")
+    assert code == 1
+    assert "--sim" in errors
+
+
+def _picture(folder: Path, effects: Sequence[causes.Effect]) -> Path:
+    return picture(folder / "causes.png", effects, "Simulated.")

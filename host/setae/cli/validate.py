@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from rich.box import SIMPLE
-from rich.table import Table
 
 from setae import record, rig, tendons
 from setae.arc import FloatArray
 from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.errors_table import print_causes, print_runs, print_targets
 from setae.cli.runs import later, say, what_is_left, write_report
 from setae.config import Config
 from setae.errors import InputError, SetaeError
+from setae.experiments import causes as why
 from setae.experiments import positions as measurements
 from setae.experiments import runs, view
-from setae.experiments.accuracy import Pose, Spread, by_group
 from setae.experiments.explore import Event
-from setae.experiments.targets import Target, choose, commanded_lengths_mm, paper_targets
+from setae.experiments.targets import Target, choose, paper_targets
 from setae.experiments.validate import Noise, measured, validate
 from setae.robot import Robot
 from setae.scene import open_scene
@@ -44,6 +44,7 @@ def validate_command(
     noise_mm: float = 0.0,
     noise_seed: int = 0,
     out: Path | None = None,
+    causes: Flag = False,
     resume: Flag = False,
     force: Flag = False,
     report: bool = True,
@@ -76,6 +77,8 @@ def validate_command(
         Seed of that noise.
     out
         Folder for logs and report; the default is the next free runs/validate-N.
+    causes
+        Drive on plants with each imperfection alone, and with each mended, too.
     resume
         Go on with a run in --out that ended early.
     force
@@ -99,7 +102,7 @@ def validate_command(
     if targets is not None:
         wanted = choose(wanted, targets)
     if list_targets:
-        _list(wanted, config, models)
+        print_targets(wanted, config, models)
         return
     noise = Noise(sd_mm=noise_mm, seed=noise_seed)
     if positions:
@@ -107,16 +110,26 @@ def validate_command(
     else:
         if frame is not None:
             raise InputError("--frame belongs to --positions.", "Give both, or none.")
+        if causes and where.url != "sim://":
+            raise InputError(
+                "--causes takes the simulator's own robot apart.", "Give --sim, and a --plant."
+            )
         if noise.sd_mm and not where.simulated:
             raise InputError("--noise-mm is for simulated positions.", "Leave it out.")
         if resume and out is None:
             raise InputError("--resume needs the folder of the run.", "Give it as --out.")
         drive = _Drive(where, config, noise, out, resume=resume, force=force)
         folder = drive.all(models, wanted, accept_jump=accept_jump)
+        if causes:
+            _study(where, config, models[0], wanted, noise, folder, force=force)
     logs = sorted(folder.glob("*.mcap"))
-    _print_runs(runs.read(record.read(log) for log in logs))
+    read = [record.read(log) for log in logs]
+    found = runs.read(runs.of_kind(read, runs.EXPERIMENT))
+    print_runs(found)
+    for log in runs.of_kind(read, why.EXPERIMENT):
+        print_causes(why.effects(log))
     say(f"Logs: {folder}")
-    if report and any(run.poses for run in runs.read(record.read(log) for log in logs)):
+    if report and any(run.poses for run in found):
         try:
             write_report(logs, folder)
         except KeyboardInterrupt as interrupt:
@@ -183,8 +196,8 @@ class _Drive:
     def _done(self, model: str) -> set[str]:
         if not self._resume:
             return set()
-        found = runs.read(record.read(log) for log in sorted(self._where_to().glob("*.mcap")))
-        for run in found:
+        read = [record.read(log) for log in sorted(self._where_to().glob("*.mcap"))]
+        for run in runs.read(runs.of_kind(read, runs.EXPERIMENT)):
             if run.model == model:
                 if run.config != self._config:
                     raise InputError(
@@ -244,14 +257,19 @@ class _Drive:
                 )  # fmt: skip
 
     def _measure(self, opened: rig.Rig, count: int) -> Callable[[Target], FloatArray | None]:
-        world = opened.world
-        if world is None:
+        if opened.world is None:
             return _ask_for_picture(opened.robot, count)
+        return _look(opened, self._noise)
 
-        def look(target: Target) -> FloatArray:
-            return np.asarray(world.truth().backbone_mm[-1] + self._noise.on(target))
 
-        return look
+def _look(opened: rig.Rig, noise: Noise) -> Callable[[Target], FloatArray]:
+    world = opened.world
+    assert world is not None
+
+    def look(target: Target) -> FloatArray:
+        return np.asarray(world.truth().backbone_mm[-1] + noise.on(target))
+
+    return look
 
 
 def _ask_for_picture(robot: Robot, count: int) -> Callable[[Target], None]:
@@ -300,54 +318,37 @@ def _import(
     return folder
 
 
-# ---------------------------------------------------------------------------- printing
-
-
-def _list(targets: Sequence[Target], config: Config, models: Sequence[str]) -> None:
-    for model in models:
-        lengths, _ = commanded_lengths_mm(targets, config, model)
-        print(
-            "target,x_mm,y_mm,z_mm," + ",".join(f"length_{i}_mm" for i in range(lengths.shape[1]))
-        )
-        for target, row in zip(targets, lengths, strict=True):
-            values = [*target.position_mm, *row]
-            print(f"{target.label}," + ",".join(f"{value:.3f}" for value in values))
-
-
-def _print_runs(found: Sequence[runs.Run]) -> None:
-    for run in found:
-        if run.poses:
-            say(f"Model {run.model}: {len(run.poses)} targets, {run.source}.")
-            say("Errors in mm, mean±SD; in the bending plane, but for the last column:")
-            console.print(_table(run.poses))
-        else:
-            say(
-                f"Model {run.model}: {len(run.visited)} targets driven, none measured. Measure "
-                "the pictures, then give them with --positions and the same --out."
+def _study(
+    where: Where,
+    config: Config,
+    model: str,
+    targets: Sequence[Target],
+    noise: Noise,
+    folder: Path,
+    *,
+    force: bool,
+) -> None:
+    """Drive on the plant's imperfections one by one; one log of all."""
+    values = rig.simulator_parameters(config, where.seed)
+    study = why.cases(rig.plants.by_cause(values), model, list(tendons.MODELS))
+    path = folder / f"{why.EXPERIMENT}.mcap"
+    if force or path.exists():
+        path.unlink(missing_ok=True)
+    metadata = {"experiment": why.EXPERIMENT, "simulated": True, "seed": where.seed,
+                "plant": config.plant, "config": config.to_toml()}  # fmt: skip
+    with record.Recorder(path, metadata=metadata) as recorder, console.status("") as status:
+        for number, case in enumerate(study, start=1):
+            status.update(f"Cause {number} of {len(study)}: {case.cause or case.kind}")
+            plant = dataclasses.replace(
+                config, plant="ideal", simulator=tuple(sorted(case.parameters.items()))
             )
-
-
-def _table(poses: Sequence[Pose]) -> Table:
-    from setae.report import paper
-
-    theirs = paper.validation()
-    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
-    for name in ("group", "n", "distance", "paper", "x or y", "z", "3D"):
-        table.add_column(name, justify="left" if name == "group" else "right")
-    for group, ours in by_group(poses).items():
-        table.add_row(
-            group,
-            str(ours.targets),
-            spread(ours.in_plane),
-            spread(theirs[group].distance) if group in theirs else "",
-            *(spread(part) for part in (ours.lateral, ours.height, ours.space)),
-        )
-    return table
-
-
-def spread(value: Spread | None) -> str:
-    """Mean ± SD, such as 4.32±2.73."""
-    if value is None or np.isnan(value.mean_mm):
-        return "–"
-    sd = "" if np.isnan(value.sd_mm) else f"±{value.sd_mm:.2f}"
-    return f"{value.mean_mm:.2f}{sd}"
+            with (
+                interrupts.caught(),
+                rig.open(
+                    "sim://", config=plant, seed=where.seed, scene=open_scene(),
+                    pollables=[interrupts],
+                ) as opened,
+            ):  # fmt: skip
+                opened.robot.enable()
+                poses = validate(opened.robot, targets, _look(opened, noise), model=case.model)
+            recorder.experiment(number, "case", why.told(case, poses))

@@ -14,7 +14,7 @@ from setae.experiments.accuracy import Pose
 from setae.experiments.targets import Target, find, paper_targets
 from setae.record import Log
 
-__all__ = ["EXPERIMENT", "Run", "read"]
+__all__ = ["EXPERIMENT", "Run", "of_kind", "read"]
 
 EXPERIMENT = "validate"
 """What the metadata of such a log names."""
@@ -80,6 +80,11 @@ class Run:
         if self.noise_sd_mm:
             text += f" with noise of {self.noise_sd_mm:g} mm (SD) along each axis"
         return text
+
+
+def of_kind(logs: Iterable[Log], experiment: str) -> list[Log]:
+    """Those logs whose metadata name an experiment."""
+    return [log for log in logs if log.metadata.get("experiment") == experiment]
 
 
 def read(logs: Iterable[Log]) -> tuple[Run, ...]:

@@ -41,10 +41,10 @@ def write(logs: str | Path | Iterable[str | Path | Log], path: str | Path) -> Pa
     path = Path(path)
     read = [log if isinstance(log, Log) else record.read(log) for log in files.logs_of(logs)]
     kinds = {str(log.metadata.get("experiment") or "explore") for log in read}
-    if len(kinds) > 1:
+    if len(kinds) > 1 and kinds != {"validate", "causes"}:
         raise LogError(
             f"These logs are of different experiments: {', '.join(sorted(kinds))}.",
             "Report each experiment's logs alone.",
         )
-    writer = _WRITERS.get(kinds.pop(), explore.write)
+    writer = _WRITERS.get("validate" if len(kinds) > 1 else kinds.pop(), explore.write)
     return writer(read, path.parent, page=path.name).page

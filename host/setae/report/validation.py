@@ -14,11 +14,13 @@ import numpy as np
 
 from setae import kinematics, workspace
 from setae.errors import LogError
-from setae.experiments import runs
+from setae.experiments import causes, runs
 from setae.experiments.accuracy import Pose, Summary, by_group
+from setae.experiments.causes import EXPERIMENT
 from setae.experiments.runs import Run
 from setae.experiments.targets import Target
 from setae.record import Log, read
+from setae.report import causes as why
 from setae.report import extras, files, paper, validation_page, validation_pictures
 from setae.report.files import Report
 
@@ -47,7 +49,9 @@ def write(
     ExtraMissingError
         Matplotlib or Plotly isn't installed.
     """
-    found = runs.read(log if isinstance(log, Log) else read(log) for log in files.logs_of(logs))
+    given = [log if isinstance(log, Log) else read(log) for log in files.logs_of(logs)]
+    studies = runs.of_kind(given, EXPERIMENT)
+    found = runs.read(log for log in given if log not in studies)
     shown = [run for run in found if run.poses]
     if not shown:
         raise LogError(
@@ -59,18 +63,25 @@ def write(
     folder = Path(out)
     with files.writing(folder):
         drawn = validation_pictures.write_all(folder / "pictures", shown)
-        text = validation_page.page(shown, drawn)
+        section = ""
+        for study in studies:
+            if effects := causes.effects(study):
+                note = f"{validation_pictures.origin_note(shown[:1]).capitalize()}."
+                chart = why.picture(folder / "pictures" / "causes.png", effects, note)
+                section, drawn = why.section(effects, chart), (*drawn, chart)
+        text = validation_page.page(shown, drawn, section)
         (folder / page).write_text(text, encoding="utf-8")
         tables = (folder / "targets.csv", folder / "summary.csv")
         _write(tables[0], *_targets(shown))
         _write(tables[1], *_summaries(shown))
         (folder / "validation.json").write_text(
-            json.dumps(as_json(shown), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+            json.dumps(as_json(shown, studies), indent=1, ensure_ascii=False) + "\n",
+            encoding="utf-8",
         )
     return Report(page=folder / page, pictures=drawn, tables=tables)
 
 
-def as_json(shown: Sequence[Run]) -> dict[str, Any]:
+def as_json(shown: Sequence[Run], studies: Sequence[Log] = ()) -> dict[str, Any]:
     """All figures of a validation, for other programs; NaN becomes null."""
     data = {
         "unit": "mm",
@@ -99,6 +110,7 @@ def as_json(shown: Sequence[Run]) -> dict[str, Any]:
             }
             for run in shown
         ],
+        "causes": [asdict(effect) for study in studies for effect in causes.effects(study)],
         "paper": {group: asdict(row) for group, row in paper.validation().items()},
     }
     return _finite(data)  # type: ignore[no-any-return]
