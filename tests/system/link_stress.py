@@ -98,10 +98,11 @@ class _Era:
 
 @dataclass
 class Stress:
-    """One run."""
+    """One run; `freezes` times as often stopped, tripped and in fault as in a long one."""
 
     seed: int
     rate: float
+    freezes: float = 1.0
     count: Count = field(default_factory=Count)
 
     def __post_init__(self) -> None:
@@ -133,7 +134,7 @@ class Stress:
         self._until(lambda: session.state is State.HOLDING)
         while self.drawn < commands:
             self.drawn += 1
-            what = self.rng.random()
+            what = self.rng.random() / self.freezes
             if what < 0.002:
                 self._stop()
             elif what < 0.003:

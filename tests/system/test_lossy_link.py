@@ -177,10 +177,10 @@ def test_each_refusal_reaches_its_command(down: Faults, up: Faults, seed: int) -
 
 @pytest.mark.parametrize(("seed", "rate"), [(1, 0.01), (2, 0.1)])
 def test_random_commands_lose_and_double_nothing(seed: int, rate: float) -> None:
-    """`python -m tests.system.link_stress` is the same with 100 000 commands."""
-    count = Stress(seed, rate).run(1_500)
+    """`make line-stress` is the same with a million commands."""
+    count = Stress(seed, rate, freezes=5.0).run(1_500)
     assert count.wrong == 0, count
-    assert count.stops > 0
+    assert min(count.stops, count.trips, count.faults, count.refusals) > 0
     assert count.frames_harmed > 0
 
 
