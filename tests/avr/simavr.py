@@ -55,7 +55,9 @@ class _Statistics(ctypes.Structure):
             "stack_bytes",
             "resets",
             "turns",
+            "eeprom_writes",
             "timers_misused",
+            "crashed",
         )
     )
 
@@ -106,6 +108,8 @@ class Statistics:
         Since power-on, the watchdog's included.
     turns
         How often the firmware fed the watchdog, which its loop does once a turn.
+    eeprom_writes
+        Bytes that were written to the EEPROM.
     """
 
     receive_overruns: int
@@ -116,6 +120,7 @@ class Statistics:
     stack_bytes: int
     resets: int
     turns: int
+    eeprom_writes: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +143,15 @@ def _load() -> ctypes.CDLL:
         "uno_destroy": (None, [handle]),
         "uno_press_reset": (None, [handle]),
         "uno_cycle": (cycle, [handle]),
+        "uno_cycle_power": (None, [handle, ctypes.c_uint8]),
+        "uno_supply": (None, [handle, ctypes.c_double]),
+        "uno_bandgap": (None, [handle, ctypes.c_double]),
+        "uno_load": (None, [handle, ctypes.c_uint16, ctypes.c_char_p, size]),
+        "uno_start": (None, [handle, ctypes.c_uint16]),
+        "uno_eeprom_get": (ctypes.c_uint8, [handle, ctypes.c_uint16]),
+        "uno_eeprom_set": (None, [handle, ctypes.c_uint16, ctypes.c_uint8]),
+        "uno_usb_chip": (None, [handle, ctypes.c_int]),
+        "uno_sensor_ready_wired": (None, [handle, ctypes.c_int]),
         "uno_run": (None, [handle, cycle, ctypes.c_int]),
         "uno_send": (None, [handle, ctypes.c_char_p, size, cycle, ctypes.c_double]),
         "uno_line_free": (cycle, [handle]),
@@ -219,7 +233,48 @@ class Uno:
         """Reset as the button does, or a host that opens the port. RAM keeps its content."""
         self._library.uno_press_reset(self._handle)
 
+    # ---------------------------------------------------------------------------- power
+
+    def cycle_power(self, *, torn: int = 0xA5) -> None:
+        """Take the power away and give it back, within no time.
+
+        RAM and the sensor's settings are lost. An EEPROM byte that is being
+        written may be anything afterwards: `torn`.
+        """
+        self._library.uno_cycle_power(self._handle, torn)
+
+    def set_supply(self, volts: float) -> None:
+        """Set the chip's supply. Below 2.7 V it is held in reset until it is fed again."""
+        self._library.uno_supply(self._handle, volts)
+
+    def set_bandgap(self, volts: float) -> None:
+        """Set the chip's reference, 1.0 to 1.2 V from one to another."""
+        self._library.uno_bandgap(self._handle, volts)
+
+    # --------------------------------------------------------------------------- memory
+
+    def load(self, address: int, data: bytes) -> None:
+        """Put bytes into the flash."""
+        self._library.uno_load(self._handle, address, data, len(data))
+
+    def set_start(self, address: int) -> None:
+        """Start there now and after each reset, as the fuses tell a chip with a bootloader."""
+        self._library.uno_start(self._handle, address)
+
+    def eeprom(self, address: int, size: int) -> bytes:
+        """Return what the EEPROM holds."""
+        return bytes(self._library.uno_eeprom_get(self._handle, address + i) for i in range(size))
+
+    def set_eeprom(self, address: int, data: bytes) -> None:
+        """Put bytes into the EEPROM."""
+        for i, value in enumerate(data):
+            self._library.uno_eeprom_set(self._handle, address + i, value)
+
     # ----------------------------------------------------------------------------- line
+
+    def set_usb_chip(self, present: bool = True) -> None:
+        """Put the USB chip between: 1 ms to the board, up to 4 ms from it."""
+        self._library.uno_usb_chip(self._handle, present)
 
     def send(self, data: bytes, *, bit_cycles: float = _BIT_CYCLES) -> None:
         """Put bytes on the line to the board, behind those that are on it already."""
@@ -273,6 +328,10 @@ class Uno:
         """Set its address: 0x5D, or 0x5C where SA0 is low."""
         self._library.uno_sensor_address(self._handle, address)
 
+    def wire_data_ready(self, wired: bool = True) -> None:
+        """Connect the sensor's data-ready pin to D2."""
+        self._library.uno_sensor_ready_wired(self._handle, wired)
+
     def stick_bus(self, clocks: int) -> None:
         """Let a slave hold SDA until it has seen that many clocks."""
         self._library.uno_stick_bus(self._handle, clocks)
@@ -297,12 +356,15 @@ class Uno:
         Raises
         ------
         RuntimeError
-            The firmware drives a servo from a timer mode that is not modelled.
+            The firmware drives a servo from a timer mode that is not modelled, or did
+            what ends simavr's run.
         """
         raw = _Statistics()
         self._library.uno_statistics_get(self._handle, ctypes.byref(raw))
         if raw.timers_misused:
             raise RuntimeError("A servo pin is driven by a timer mode that is not modelled.")
+        if raw.crashed:
+            raise RuntimeError("The program left the ground: simavr's message above says where.")
         return Statistics(
             receive_overruns=raw.receive_overruns,
             receive_frame_errors=raw.receive_frame_errors,
@@ -312,6 +374,7 @@ class Uno:
             stack_bytes=raw.stack_bytes,
             resets=raw.resets,
             turns=raw.turns,
+            eeprom_writes=raw.eeprom_writes,
         )
 
     def handler(self, vector: int) -> HandlerTime:

@@ -1,49 +1,40 @@
-"""The peripherals' models against the data sheet, by programs of a few instructions."""
+"""Timers, serial line and what is measured of the core, by programs of a few instructions."""
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 import pytest
-from tests.avr.simavr import Uno
-
-DDRB, GTCCR = 0x24, 0x43
-TCCR1A, TCCR1B, TCCR1C, TCNT1L, TCNT1H, OCR1AL, OCR1AH = 0x80, 0x81, 0x82, 0x84, 0x85, 0x88, 0x89
-TCCR2A, TCCR2B, TCNT2, OCR2A = 0xB0, 0xB1, 0xB2, 0xB3
-UCSR0B, UBRR0L, UDR0 = 0xC1, 0xC4, 0xC6
+from tests.avr.programs import (
+    CLI,
+    DDRB,
+    GTCCR,
+    NOP,
+    OCR1AH,
+    OCR1AL,
+    OCR2A,
+    PUSH,
+    SEI,
+    STORE_CYCLES,
+    TCCR1A,
+    TCCR1B,
+    TCCR1C,
+    TCCR2A,
+    TCCR2B,
+    TCNT1H,
+    TCNT1L,
+    TCNT2,
+    UBRR0L,
+    UCSR0B,
+    UDR0,
+    boot,
+    delay,
+    store,
+)
 
 D9, D11 = 0, 2  # as servos
 PRESCALER = 8
 MATCH = 100
-STORE_CYCLES = 3  # LDI and STS
-
-
-def store(*pairs: tuple[int, int]) -> list[int]:
-    """LDI r16 and STS for each (address, value)."""
-    words = []
-    for address, value in pairs:
-        words += [0xE000 | (value & 0xF0) << 4 | value & 0x0F, 0x9300, address]
-    return words
-
-
-def boot(folder: Path, words: list[int]) -> Uno:
-    """Run a program, which ends in an endless loop, from address 0."""
-    code = struct.pack(f"<{len(words) + 1}H", *words, 0xCFFF)
-    names = b"\0.text\0.shstrtab\0"
-    header_bytes, section_bytes = 52, 40
-    sections_at = header_bytes + len(code) + len(names)
-    elf = struct.pack(
-        "<16sHHIIIIIHHHHHH",
-        b"\x7fELF\x01\x01\x01", 2, 83, 1, 0, 0, sections_at, 0, header_bytes, 0, 0,
-        section_bytes, 3, 2,
-    )  # fmt: skip
-    elf += code + names + bytes(section_bytes)
-    elf += struct.pack("<10I", 1, 1, 6, 0, header_bytes, len(code), 0, 0, 2, 0)
-    elf += struct.pack("<10I", 7, 3, 0, 0, header_bytes + len(code), len(names), 0, 0, 1, 0)
-    path = folder / "program.elf"
-    path.write_bytes(elf)
-    return Uno(path)
 
 
 def test_force_compare_acts_at_once_and_a_match_one_clock_after_it(tmp_path: Path) -> None:
@@ -116,3 +107,45 @@ def test_a_byte_takes_ten_bits(tmp_path: Path) -> None:
     assert data == b"\x55\xaa"
     written = 3 * STORE_CYCLES - 2
     assert end == written + 2 * 10 * 64
+
+
+FRAME = 10 * 64  # cycles of a byte at UBRR0 = 3
+
+
+def test_the_usb_chip_holds_bytes_back(tmp_path: Path) -> None:
+    """1 ms down; up at the next full 4 ms."""
+    program = store((UBRR0L, 3), (UCSR0B, 0x18), (UDR0, 0x55), (UDR0, 0xAA))
+    with boot(tmp_path, program) as uno:
+        uno.set_usb_chip()
+        uno.run_to(63_000)
+        assert uno.receive()[0] == b""
+        uno.run_to(65_000)
+        assert uno.receive() == (b"\x55\xaa", 64_000)
+        uno.send(b"\x01", bit_cycles=64)
+        assert uno.line_free == pytest.approx(uno.cycle + 16_000 + FRAME, abs=1)
+
+
+def test_the_usb_chip_hands_over_a_full_packet_at_once(tmp_path: Path) -> None:
+    spaced = [word for _ in range(70) for word in [*store((UDR0, 0x55)), *delay(700)]]
+    with boot(tmp_path, [*store((UBRR0L, 3), (UCSR0B, 0x18)), *spaced]) as uno:
+        uno.set_usb_chip()
+        uno.run_to(55_000)
+        data, end = uno.receive()
+    assert len(data) == 64
+    assert end < 64 * 705 + 2 * FRAME
+
+
+def test_interrupts_off_is_measured_to_the_cycle(tmp_path: Path) -> None:
+    """From CLI's first cycle to the end of SEI."""
+    with boot(tmp_path, [SEI, *[NOP] * 20, CLI, *[NOP] * 40, SEI, NOP, CLI, NOP, SEI]) as uno:
+        uno.run_to(3)
+        assert uno.cycle < 20
+        uno.watch_interrupts()
+        uno.run_to(200)
+        assert uno.statistics().interrupts_off_cycles == 42
+
+
+def test_the_deepest_stack_is_seen(tmp_path: Path) -> None:
+    with boot(tmp_path, [PUSH] * 17) as uno:
+        uno.run_to(100)
+        assert uno.statistics().stack_bytes == 17

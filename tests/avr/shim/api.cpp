@@ -37,7 +37,9 @@ struct uno_statistics {
   uint64_t stack_bytes;
   uint64_t resets;
   uint64_t turns;
+  uint64_t eeprom_writes;
   uint64_t timers_misused;
+  uint64_t crashed;
 };
 
 Uno* uno_create(const char* elf_path) {
@@ -61,6 +63,34 @@ void uno_press_reset(Uno* uno) {
   uno->press_reset();
 }
 
+void uno_cycle_power(Uno* uno, uint8_t torn) {
+  uno->cycle_power(torn);
+}
+
+void uno_supply(Uno* uno, double volts) {
+  uno->set_supply(volts);
+}
+
+void uno_bandgap(Uno* uno, double volts) {
+  uno->adc().set_bandgap(volts);
+}
+
+void uno_load(Uno* uno, uint16_t address, const uint8_t* data, size_t size) {
+  uno->load(address, data, size);
+}
+
+void uno_start(Uno* uno, uint16_t address) {
+  uno->set_start(address);
+}
+
+uint8_t uno_eeprom_get(Uno* uno, uint16_t address) {
+  return uno->eeprom().get(address);
+}
+
+void uno_eeprom_set(Uno* uno, uint16_t address, uint8_t value) {
+  uno->eeprom().set(address, value);
+}
+
 uint64_t uno_cycle(Uno* uno) {
   return uno->chip().cycle();
 }
@@ -81,7 +111,7 @@ uint64_t uno_line_free(Uno* uno) {
 
 // Returns how many; `end` is when the last of them had passed.
 size_t uno_receive(Uno* uno, uint8_t* data, size_t room, uint64_t* end) {
-  auto& sent = uno->usart().sent_by_board();
+  auto& sent = uno->usb().for_host();
   size_t count = 0;
   for (; count < room && !sent.empty(); ++count) {
     data[count] = sent.front().value;
@@ -129,6 +159,14 @@ void uno_sensor_identity(Uno* uno, uint8_t identity) {
   uno->sensor().set_identity(identity);
 }
 
+void uno_sensor_ready_wired(Uno* uno, int wired) {
+  uno->d2().set_wired(wired != 0);
+}
+
+void uno_usb_chip(Uno* uno, int present) {
+  uno->usb().set_present(present != 0);
+}
+
 void uno_sensor_address(Uno* uno, uint8_t address) {
   uno->sensor().set_address(address);
 }
@@ -150,7 +188,9 @@ void uno_statistics_get(Uno* uno, uno_statistics* out) {
           static_cast<uint64_t>(uno->stack_bytes()),
           static_cast<uint64_t>(uno->resets()),
           uno->turns(),
-          uno->pins().timer1().misused() || uno->pins().timer2().misused()};
+          uno->eeprom().writes(),
+          uno->pins().timer1().misused() || uno->pins().timer2().misused(),
+          uno->crashed()};
 }
 
 void uno_handler(Uno* uno, int vector, uint64_t* count, uint64_t* total, uint64_t* longest) {

@@ -1,7 +1,6 @@
 #include "chip.h"
 
 extern "C" {
-#include <avr_extint.h>
 #include <sim_elf.h>
 #include <sim_regbit.h>
 }
@@ -62,6 +61,8 @@ Chip::Chip(const std::string& elf_path) : avr_(avr_make_mcu_by_name("atmega328p"
       watchdog_ = reinterpret_cast<avr_watchdog_t*>(io);
     if (kind == "eeprom")
       eeprom_ = reinterpret_cast<avr_eeprom_t*>(io);
+    if (kind == "extint")
+      external_ = reinterpret_cast<avr_extint_t*>(io);
     if (kind == "adc")
       adc_ = reinterpret_cast<avr_adc_t*>(io);
     if (kind == "timer") {
@@ -71,7 +72,7 @@ Chip::Chip(const std::string& elf_path) : avr_(avr_make_mcu_by_name("atmega328p"
     }
   }
   if (uart_ == nullptr || twi_ == nullptr || timers_[1] == nullptr || timers_[2] == nullptr ||
-      watchdog_ == nullptr || eeprom_ == nullptr || adc_ == nullptr)
+      watchdog_ == nullptr || eeprom_ == nullptr || adc_ == nullptr || external_ == nullptr)
     throw std::runtime_error("this simavr lacks a peripheral of the ATmega328P");
   watchdog_->io.ioctl = nullptr;  // it would answer WDR before the model here sees it
   // Otherwise a low D2 or D3 costs an event each cycle.
@@ -120,21 +121,31 @@ avr_cycle_count_t Alarm::ring(avr_t*, avr_cycle_count_t, void* self) {
 LevelInterrupt::LevelInterrupt(Chip& chip, avr_int_vector_t& vector)
     : chip_(chip), vector_(vector) {
   vector_.raise_sticky = 1;
+  avr_irq_register_notify(&vector_.irq[AVR_INT_IRQ_RUNNING], on_running, this);
 }
 
 void LevelInterrupt::set(bool on) {
+  on_ = on;
   if (on) {
-    avr_regbit_set(chip_.avr(), vector_.raised);
+    if (vector_.raised.reg != 0)  // the EEPROM's has no flag
+      avr_regbit_set(chip_.avr(), vector_.raised);
     avr_raise_interrupt(chip_.avr(), &vector_);
   } else {
     avr_clear_interrupt(chip_.avr(), &vector_);
-    avr_regbit_clear(chip_.avr(), vector_.raised);
+    if (vector_.raised.reg != 0)
+      avr_regbit_clear(chip_.avr(), vector_.raised);
   }
 }
 
 void LevelInterrupt::look_again() {
-  if (avr_regbit_get(chip_.avr(), vector_.raised))
+  if (on_)
     avr_raise_interrupt(chip_.avr(), &vector_);
+}
+
+// The handler has returned, and the condition may still be there.
+void LevelInterrupt::on_running(avr_irq_t*, uint32_t running, void* self) {
+  if (!running)
+    static_cast<LevelInterrupt*>(self)->look_again();
 }
 
 }  // namespace uno

@@ -7,6 +7,7 @@
 extern "C" {
 #include <avr_adc.h>
 #include <avr_eeprom.h>
+#include <avr_extint.h>
 #include <avr_timer.h>
 #include <avr_twi.h>
 #include <avr_uart.h>
@@ -37,6 +38,7 @@ class Chip {
   Chip& operator=(const Chip&) = delete;
 
   Cycle cycle() const { return avr_->cycle; }
+  bool crashed() const { return avr_->state == cpu_Crashed || avr_->state == cpu_Done; }
   // Data space addresses, as in the data sheet's register summary (in parentheses there).
   uint8_t get(uint16_t address) const { return avr_->data[address]; }
   void set(uint16_t address, uint8_t value) { avr_->data[address] = value; }
@@ -51,6 +53,7 @@ class Chip {
   avr_watchdog_t& watchdog() { return *watchdog_; }
   avr_eeprom_t& eeprom() { return *eeprom_; }
   avr_adc_t& adc() { return *adc_; }
+  avr_extint_t& external() { return *external_; }
   avr_timer_t& timer(int number) { return *timers_[number]; }
 
  private:
@@ -60,6 +63,7 @@ class Chip {
   avr_watchdog_t* watchdog_ = nullptr;
   avr_eeprom_t* eeprom_ = nullptr;
   avr_adc_t* adc_ = nullptr;
+  avr_extint_t* external_ = nullptr;
   avr_timer_t* timers_[3] = {};
   std::vector<std::unique_ptr<OnRead>> reads_;
   std::vector<std::unique_ptr<OnWrite>> writes_;
@@ -90,12 +94,15 @@ class LevelInterrupt {
  public:
   LevelInterrupt(Chip& chip, avr_int_vector_t& vector);
   void set(bool on);
-  // After the enable bit was set, or the handler has returned.
+  // After the enable bit was set.
   void look_again();
 
  private:
+  static void on_running(avr_irq_t* irq, uint32_t running, void* self);
+
   Chip& chip_;
   avr_int_vector_t& vector_;
+  bool on_ = false;
 };
 
 }  // namespace uno

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include <utility>
+
 namespace setae {
 namespace uno {
 namespace {
@@ -12,6 +14,7 @@ constexpr double kClockHz = 16e6;
 constexpr uint8_t kWhoAmI = 0x0F;
 constexpr uint8_t kCtrlReg1 = 0x10;
 constexpr uint8_t kCtrlReg2 = 0x11;
+constexpr uint8_t kCtrlReg3 = 0x12;
 constexpr uint8_t kStatus = 0x27;
 constexpr uint8_t kPressOutXl = 0x28;
 constexpr uint8_t kPressOutH = 0x2A;
@@ -22,6 +25,8 @@ constexpr uint8_t kBlockDataUpdate = 1 << 1;
 constexpr uint8_t kSoftwareReset = 1 << 2;
 constexpr uint8_t kAutoIncrement = 1 << 4;
 constexpr uint8_t kBoot = 1 << 7;
+constexpr uint8_t kActiveLow = 1 << 7;
+constexpr uint8_t kDataReady = 1 << 2;
 
 // Section 9, CTRL_REG1: output data rates by bits 6:4.
 constexpr double kRatesHz[8] = {0, 1, 10, 25, 50, 75, 0, 0};
@@ -33,16 +38,35 @@ bool writable(uint8_t reg) {
 
 }  // namespace
 
-Lps33hw::Lps33hw(Chip& chip)
-    : chip_(chip), next_sample_(chip, [this](Cycle when) { sample(when); }) {
-  power_up();
+Lps33hw::Lps33hw(Chip& chip, std::function<void(bool)> on_ready)
+    : chip_(chip),
+      on_ready_(std::move(on_ready)),
+      next_sample_(chip, [this](Cycle when) { sample(when); }) {
+  clear();
 }
 
 void Lps33hw::power_up() {
+  clear();
+  tell_ready();
+}
+
+void Lps33hw::keep_sampling() {
+  if (kRatesHz[(registers_[kCtrlReg1] >> 4) & 7] != 0)
+    next_sample_.set(static_cast<Cycle>(llround(due_)));
+}
+
+void Lps33hw::clear() {
   memset(registers_, 0, sizeof(registers_));
   registers_[kCtrlReg2] = kAutoIncrement;
   locked_ = held_back_ = false;
   next_sample_.cancel();
+}
+
+// CTRL_REG3: the data-ready signal on the pin, and which level says so.
+void Lps33hw::tell_ready() {
+  const uint8_t control = registers_[kCtrlReg3];
+  const bool ready = (control & kDataReady) && (registers_[kStatus] & kPressureReady);
+  on_ready_(ready != ((control & kActiveLow) != 0));
 }
 
 bool Lps33hw::addressed(uint8_t address, bool reading) {
@@ -78,6 +102,8 @@ void Lps33hw::write_register(uint8_t reg, uint8_t value) {
     return;
   }
   registers_[reg] = value;
+  if (reg == kCtrlReg3)
+    tell_ready();
   if (reg == kCtrlReg1) {
     const double rate_hz = kRatesHz[(value >> 4) & 7];
     if (rate_hz == 0) {
@@ -101,6 +127,7 @@ uint8_t Lps33hw::read_register(uint8_t reg) {
     if (held_back_)
       show(held_raw_);
     held_back_ = false;
+    tell_ready();
   }
   return value;
 }
@@ -133,6 +160,7 @@ void Lps33hw::show(int32_t raw) {
   for (int i = 0; i < 3; ++i)
     registers_[kPressOutXl + i] = static_cast<uint8_t>(static_cast<uint32_t>(raw) >> (8 * i));
   registers_[kStatus] = static_cast<uint8_t>(registers_[kStatus] | kPressureReady | overrun);
+  tell_ready();
 }
 
 }  // namespace uno

@@ -18,7 +18,13 @@ struct PressureSample {
 
 class Lps33hw {
  public:
-  explicit Lps33hw(Chip& chip);
+  // `on_ready` gets the level of the INT_DRDY pin whenever it may have changed.
+  Lps33hw(Chip& chip, std::function<void(bool level)> on_ready);
+
+  // Power comes anew: the registers are lost.
+  void power_up();
+  // A reset of the board, which is none of the sensor's business, but empties simavr's alarms.
+  void keep_sampling();
 
   // I2C, as its master's side calls it.
   bool addressed(uint8_t address, bool reading);
@@ -39,13 +45,15 @@ class Lps33hw {
   std::vector<PressureSample>& samples() { return samples_; }
 
  private:
-  void power_up();
+  void clear();
+  void tell_ready();
   void write_register(uint8_t reg, uint8_t value);
   uint8_t read_register(uint8_t reg);
   void sample(Cycle when);
   void show(int32_t raw);
 
   Chip& chip_;
+  std::function<void(bool)> on_ready_;
   Alarm next_sample_;
   uint8_t address_ = 0x5D;
   uint8_t identity_ = 0xB1;

@@ -15,7 +15,10 @@ namespace {
 constexpr uint16_t kMcusr = 0x54;
 constexpr uint8_t kPowerOnReset = 1 << 0;
 constexpr uint8_t kExternalReset = 1 << 1;
+constexpr uint8_t kBrownOutReset = 1 << 2;
 constexpr uint8_t kWatchdogReset = 1 << 3;
+// The UNO's fuses.
+constexpr double kBrownOutVolts = 2.7;
 constexpr uint16_t kRamStart = 0x100;
 // Memory holds anything at power-on; no counter or pointer is likely to be that.
 constexpr uint8_t kPaint = 0xC5;
@@ -30,11 +33,15 @@ const char* kNoNames[] = {nullptr};
 
 Uno::Uno(const std::string& elf_path)
     : chip_(elf_path),
-      usart_(chip_),
-      sensor_(chip_),
+      usb_(chip_),
+      usart_(chip_, usb_),
+      d2_(chip_),
+      sensor_(chip_, [this](bool level) { d2_.drive(level); }),
       twi_(chip_, sensor_),
       pins_(chip_),
       watchdog_(chip_, [this] { bitten_ = true; }),
+      eeprom_(chip_),
+      adc_(chip_),
       end_(chip_, [](Cycle) {}) {
   avr_t* avr = chip_.avr();
   listener_.uno = this;
@@ -53,10 +60,15 @@ Uno::Uno(const std::string& elf_path)
     avr_irq_register_notify(&avr->interrupts.vector[i]->irq[AVR_INT_IRQ_RUNNING], on_running,
                             vectors_.back().get());
   }
-  memset(avr->data + kRamStart, kPaint, avr->ramend + 1u - kRamStart);
+  paint_ram();
   avr_reset(avr);
   chip_.set(kMcusr, kPowerOnReset);
   reset_peripherals();
+}
+
+void Uno::paint_ram() {
+  avr_t* avr = chip_.avr();
+  memset(avr->data + kRamStart, kPaint, avr->ramend + 1u - kRamStart);
 }
 
 Uno::~Uno() {
@@ -79,6 +91,11 @@ void Uno::reset_peripherals() {
   twi_.reset();
   pins_.reset();
   watchdog_.reset();
+  usb_.reset();
+  eeprom_.reset();
+  adc_.reset();
+  sensor_.keep_sampling();
+  d2_.reset();
   if (run_end_ > chip_.cycle())  // a reset empties simavr's list of events
     end_.set(run_end_);
 }
@@ -95,6 +112,34 @@ void Uno::restart(uint8_t cause) {
   chip_.avr()->cycle = now;
   chip_.set(kMcusr, flags);
   reset_peripherals();
+}
+
+void Uno::cycle_power(uint8_t torn) {
+  eeprom_.cut(torn);
+  sensor_.power_up();
+  chip_.set(kMcusr, 0);
+  restart(kPowerOnReset);
+  paint_ram();
+  resets_ = 0;
+}
+
+void Uno::set_supply(double volts) {
+  adc_.set_supply(volts);
+  const bool low = volts < kBrownOutVolts;
+  if (low && !held_) {
+    eeprom_.cut(0);
+    restart(kBrownOutReset);
+  }
+  held_ = low;
+}
+
+void Uno::load(uint16_t address, const uint8_t* data, size_t size) {
+  memcpy(chip_.avr()->flash + address, data, size);
+}
+
+void Uno::set_start(uint16_t address) {
+  chip_.avr()->reset_pc = address;
+  chip_.avr()->pc = address;
 }
 
 void Uno::on_running(avr_irq_t*, uint32_t running, void* entry) {
@@ -116,8 +161,6 @@ void Uno::on_running(avr_irq_t*, uint32_t running, void* entry) {
   // After RETI the part runs one more instruction, simavr 1.6 two.
   if (avr->interrupt_state == -2)
     avr->interrupt_state = -1;
-  if (vector.vector->raise_sticky && avr_regbit_get(avr, vector.vector->raised))
-    avr_raise_interrupt(avr, vector.vector);
 }
 
 void Uno::run(Cycle end, bool stop_after_frame) {
@@ -125,13 +168,21 @@ void Uno::run(Cycle end, bool stop_after_frame) {
   run_end_ = end;
   if (chip_.cycle() >= end)
     return;
+  if (held_ || crashed()) {
+    chip_.avr()->cycle = end;
+    return;
+  }
   end_.set(end);
-  size_t seen = usart_.sent_by_board().size();
+  size_t seen = usb_.for_host().size();
   while (chip_.cycle() < end) {
     // simavr runs instructions in a burst until its next event.
     avr->run_cycle_limit = watching_ ? 1 : kBurst;
+    if (watching_)
+      avr->run_cycle_count = 1;
     const Cycle before = chip_.cycle();
     avr_run(avr);
+    if (crashed())
+      break;
     if (chip_.cycle() < before)
       avr->cycle = before;
     if (bitten_) {
@@ -149,9 +200,9 @@ void Uno::run(Cycle end, bool stop_after_frame) {
       }
       was_off_ = off;
     }
-    if (stop_after_frame && usart_.sent_by_board().size() > seen) {
-      seen = usart_.sent_by_board().size();
-      if (usart_.sent_by_board().back().value == 0)
+    if (stop_after_frame && usb_.for_host().size() > seen) {
+      seen = usb_.for_host().size();
+      if (usb_.present() || usb_.for_host().back().value == 0)
         break;
     }
   }

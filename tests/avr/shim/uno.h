@@ -4,11 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "adc.h"
 #include "chip.h"
+#include "eeprom.h"
+#include "input.h"
 #include "lps33hw.h"
 #include "pins.h"
 #include "twi.h"
 #include "usart.h"
+#include "usb_chip.h"
 #include "watchdog.h"
 
 namespace setae {
@@ -28,10 +32,24 @@ class Uno {
 
   // Pressing the button, or opening the port: RAM stays.
   void press_reset();
+  // Takes the power away and gives it back: RAM is lost, the sensor starts anew, and the EEPROM
+  // byte that was being written becomes `torn`.
+  void cycle_power(uint8_t torn);
+  // What the chip is fed with. Below 2.7 V it is held in reset, and starts when it is fed again.
+  void set_supply(double volts);
+  // Puts bytes into the flash.
+  void load(uint16_t address, const uint8_t* data, size_t size);
+  // Where a reset goes to: the fuse BOOTRST and the size of the bootloader.
+  void set_start(uint16_t address);
   // Until that cycle, or until the board has sent a byte of 0: a whole frame.
   void run(Cycle end, bool stop_after_frame);
 
+  UsbChip& usb() { return usb_; }
   Usart& usart() { return usart_; }
+  Eeprom& eeprom() { return eeprom_; }
+  Adc& adc() { return adc_; }
+  // Where the sensor's data-ready pin goes, if it is wired.
+  Input& d2() { return d2_; }
   Lps33hw& sensor() { return sensor_; }
   Twi& twi() { return twi_; }
   Pins& pins() { return pins_; }
@@ -44,6 +62,8 @@ class Uno {
   uint32_t longest_off_at() const { return longest_off_at_; }
   // Deepest stack since power-on.
   int stack_bytes() const;
+  // The program did what no part does: simavr gave up.
+  bool crashed() const { return chip_.crashed(); }
   int resets() const { return resets_; }
   // How often the main loop said that it turns, by the instruction WDR.
   uint64_t turns() const { return watchdog_.feeds(); }
@@ -69,12 +89,18 @@ class Uno {
   // RAM stays, and the flags of earlier resets.
   void restart(uint8_t cause);
 
+  void paint_ram();
+
   Chip chip_;
+  UsbChip usb_;
   Usart usart_;
+  Input d2_;
   Lps33hw sensor_;
   Twi twi_;
   Pins pins_;
   Watchdog watchdog_;
+  Eeprom eeprom_;
+  Adc adc_;
   Listener listener_ = {};
   std::vector<std::unique_ptr<Vector>> vectors_;
   Alarm end_;
@@ -86,6 +112,7 @@ class Uno {
   Cycle longest_off_ = 0;
   uint32_t longest_off_at_ = 0;
   bool bitten_ = false;
+  bool held_ = false;  // by the brown-out detector
   int resets_ = 0;
 };
 

@@ -29,8 +29,9 @@ constexpr double kStopSampleBits = 9.625;
 
 }  // namespace
 
-Usart::Usart(Chip& chip)
+Usart::Usart(Chip& chip, UsbChip& usb)
     : chip_(chip),
+      usb_(usb),
       receive_complete_(chip, chip.uart().rxc),
       data_empty_(chip, chip.uart().udrc),
       receive_(chip,
@@ -63,14 +64,16 @@ void Usart::reset() {
     line_.pop_front();
     in_frame_ = false;
   }
-  chip_.set(kUcsrA, kDataEmpty);
+  receive_complete_.set(false);
+  chip_.set(kUcsrA, 0);
+  data_empty_.set(true);
   chip_.set(kUcsrB, 0);
   chip_.set(kUcsrC, 0x06);
   expect_next();
 }
 
 void Usart::send(uint8_t value, Cycle earliest, double bit_cycles) {
-  const double start = std::max(line_free_, static_cast<double>(earliest));
+  const double start = std::max(line_free_, static_cast<double>(earliest + usb_.down_cycles()));
   line_free_ = start + kFrameBits * bit_cycles;
   line_.push_back({value, start, bit_cycles});
   if (line_.size() == 1)
@@ -186,7 +189,7 @@ void Usart::write_data(uint8_t value) {
 }
 
 void Usart::shift_out(Cycle when) {
-  sent_.push_back({when, shifting_});
+  usb_.from_board({when, shifting_});
   transmitting_ = waiting_;
   if (waiting_) {
     waiting_ = false;

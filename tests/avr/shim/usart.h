@@ -5,18 +5,14 @@
 #include <deque>
 
 #include "chip.h"
+#include "usb_chip.h"
 
 namespace setae {
 namespace uno {
 
-struct LineByte {
-  Cycle end;  // of its stop bit
-  uint8_t value;
-};
-
 class Usart {
  public:
-  explicit Usart(Chip& chip);
+  Usart(Chip& chip, UsbChip& usb);
   void reset();
 
   // Puts a byte on the line to the board as soon as that is free, not before `earliest`.
@@ -25,7 +21,6 @@ class Usart {
   // When the line to the board is free again.
   Cycle line_free() const { return static_cast<Cycle>(line_free_ + 0.5); }
 
-  std::deque<LineByte>& sent_by_board() { return sent_; }
   uint32_t overruns() const { return overruns_; }
   uint32_t frame_errors() const { return frame_errors_; }
   // Cycles from a byte's arrival to its being read, at worst.
@@ -56,6 +51,7 @@ class Usart {
   Cycle bit_cycles() const;
 
   Chip& chip_;
+  UsbChip& usb_;
   LevelInterrupt receive_complete_;
   LevelInterrupt data_empty_;
   Alarm receive_;
@@ -73,7 +69,6 @@ class Usart {
   bool waiting_ = false;
   uint8_t shifting_ = 0;
   uint8_t next_ = 0;
-  std::deque<LineByte> sent_;
 
   uint32_t overruns_ = 0;
   uint32_t frame_errors_ = 0;

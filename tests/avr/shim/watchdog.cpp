@@ -70,7 +70,8 @@ void Watchdog::write_control(uint8_t value) {
     avr_clear_interrupt(chip_.avr(), &chip_.watchdog().watchdog);
   }
   if (now <= open_until_ && !(value & kChange)) {
-    after = static_cast<uint8_t>((after & ~(kPrescaler | kReset)) | (value & (kPrescaler | kReset)));
+    after =
+        static_cast<uint8_t>((after & ~(kPrescaler | kReset)) | (value & (kPrescaler | kReset)));
     open_until_ = 0;
   } else if ((value & (kChange | kReset)) == (kChange | kReset)) {
     open_until_ = now + kWindowCycles;
