@@ -30,7 +30,7 @@ SANITIZED: Final = (
 )  # fmt: skip
 COUNTED: Final = ("clang++", "-O1", "-g", "-fprofile-instr-generate", "-fcoverage-mapping")
 FAST: Final = ("clang++", "-O2")
-QUICK: Final = ("clang++", "-O0")
+QUICK: Final = ("clang++", "-O1")
 _COMMON: Final = ("-std=c++14", "-Wall", "-Wextra", "-Werror")
 
 
@@ -50,6 +50,31 @@ def compile_object(compiler: Sequence[str], source: Path, out: Path) -> None:
     _run([*compiler, *_COMMON, *includes(), "-c", str(source), "-o", str(out)])
 
 
+def objects(
+    compiler: Sequence[str], sources: Iterable[Path], *, tag: str, for_firmware: Sequence[str] = ()
+) -> list[Path]:
+    """Compile sources, those that have changed; a header counts for all.
+
+    Parameters
+    ----------
+    tag
+        Of the way they are compiled: objects of one tag are shared.
+    for_firmware
+        More options for the firmware's sources.
+    """
+    folder = BUILD / tag
+    folder.mkdir(parents=True, exist_ok=True)
+    newest = _newest_header()
+    made = []
+    for source in sources:
+        out = folder / f"{source.relative_to(ROOT).as_posix().replace('/', '.')}.o"
+        if not out.exists() or out.stat().st_mtime < max(newest, source.stat().st_mtime):
+            more = for_firmware if source.is_relative_to(LIBRARIES) else ()
+            compile_object([*compiler, *more], source, out)
+        made.append(out)
+    return made
+
+
 def build(
     compiler: Sequence[str],
     name: str,
@@ -64,30 +89,20 @@ def build(
     Parameters
     ----------
     name, tag
-        Of the program, and of the way it is built: objects of one tag are shared.
+        Of the program, and of the way it is built.
     for_firmware, for_program
         More options for the compiler, and for the linker.
     """
-    folder = BUILD / tag
-    folder.mkdir(parents=True, exist_ok=True)
-    newest = _newest_header()
-    objects = []
-    firmware = firmware_sources()
-    for source in (*firmware, *sources):
-        out = folder / f"{source.relative_to(ROOT).as_posix().replace('/', '.')}.o"
-        if not out.exists() or out.stat().st_mtime < max(newest, source.stat().st_mtime):
-            more = for_firmware if source in firmware else ()
-            compile_object([*compiler, *more], source, out)
-        objects.append(out)
-    program = folder / name
-    if not program.exists() or program.stat().st_mtime < max(o.stat().st_mtime for o in objects):
-        link([*compiler, *for_program], objects, program)
+    parts = objects(compiler, [*firmware_sources(), *sources], tag=tag, for_firmware=for_firmware)
+    program = BUILD / tag / name
+    if not program.exists() or program.stat().st_mtime < max(o.stat().st_mtime for o in parts):
+        link([*compiler, *for_program], parts, program)
     return program
 
 
-def link(compiler: Sequence[str], objects: Iterable[Path], program: Path) -> None:
+def link(compiler: Sequence[str], parts: Iterable[Path], program: Path) -> None:
     """Link objects into a program."""
-    _run([*compiler, *(str(item) for item in objects), "-o", str(program)])
+    _run([*compiler, *(str(part) for part in parts), "-o", str(program)])
 
 
 def fuzzer(target: str) -> Path:
@@ -125,14 +140,25 @@ def packed(target: str) -> Path:
 
 def read_corpus(target: str) -> list[bytes]:
     """Return the inputs of a target's corpus."""
-    path = packed(target)
-    return [bytes.fromhex(line) for line in path.read_text().split()] if path.exists() else []
+    lines = packed(target).read_text().splitlines()
+    return [bytes.fromhex(line.partition("#")[0]) for line in lines]
 
 
 def write_corpus(target: str, inputs: Iterable[bytes]) -> None:
-    """Replace a target's corpus, the short inputs first."""
-    lines = sorted({item.hex() for item in inputs if item}, key=lambda text: (len(text), text))
+    """Replace a target's corpus, the short inputs first; those made by hand stay.
+
+    By hand are those with a comment.
+    """
+    lines = [line for line in packed(target).read_text().splitlines() if "#" in line]
+    by_hand = set(read_by_hand(lines))
+    found = {item.hex() for item in inputs if item and item not in by_hand}
+    lines += sorted(found, key=lambda text: (len(text), text))
     packed(target).write_text("".join(f"{line}\n" for line in lines))
+
+
+def read_by_hand(lines: Iterable[str]) -> list[bytes]:
+    """Return the inputs of lines with a comment."""
+    return [bytes.fromhex(line.partition("#")[0]) for line in lines if "#" in line]
 
 
 def unpack(target: str, folder: Path) -> Path:

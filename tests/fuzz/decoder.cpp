@@ -1,7 +1,8 @@
 // Target: the board's receiver, fed with whole, damaged and made-up frames, must find the very
 // messages that the reference finds, and count the very damage.
 //
-// Input: parts, each begun by a byte. Its lowest two bits say what follows, the others how long:
+// Input: a byte that says in which pieces the receiver gets the stream, then parts, each begun by a
+// byte. Its lowest two bits say what follows, the others how long:
 //   0  raw bytes
 //   1  a sealed frame: these bytes, CRC and stuffing added
 //   2  the same, one bit of it flipped
@@ -19,30 +20,50 @@ namespace {
 
 // Bytes on the line in one run: a few frames.
 constexpr uint32_t kEnough = 256;
+constexpr size_t kPieceMax = 64;
 
 class Duel {
  public:
+  // The receiver gets so many bytes at a time.
+  explicit Duel(size_t piece) : piece_(piece) {}
+
   uint32_t pushed() const { return pushed_; }
 
   void push(uint8_t wire) {
     ++pushed_;
-    const bool accepted = receiver_.push(wire);
-    bool expected = false;
-    switch (reference_.push(wire)) {
-      case ReferenceDecoder::Found::kNothing:
-        break;
-      case ReferenceDecoder::Found::kDamage:
-        ++damaged_;
-        break;
-      case ReferenceDecoder::Found::kFrame:
-        expected = is_message();
-        damaged_ += !expected;
-        break;
+    // At the buffer's end: who reads on behind it is found out.
+    uint8_t* const first = buffer_ + sizeof(buffer_) - piece_;
+    first[size_++] = wire;
+    if (size_ == piece_)
+      flush();
+  }
+
+  void flush() {
+    const uint8_t* next = buffer_ + sizeof(buffer_) - piece_;
+    while (size_ != 0) {
+      bool message;
+      const uint8_t taken = receiver_.take(next, static_cast<uint8_t>(size_), message);
+      expect(taken != 0 && taken <= size_, "takes something, and no more than there is");
+      compare(next, taken, message);
+      next += taken;
+      size_ -= taken;
     }
-    expect(accepted == expected,
-           accepted ? "accepts no frame but a right one" : "accepts each right frame");
+  }
+
+ private:
+  // Only the last byte can have ended a frame.
+  void compare(const uint8_t* wire, uint8_t taken, bool message) {
+    ReferenceDecoder::Found found = ReferenceDecoder::Found::kNothing;
+    for (uint8_t i = 0; i < taken; ++i) {
+      expect(found == ReferenceDecoder::Found::kNothing, "looks at each frame that ends");
+      found = reference_.push(wire[i]);
+    }
+    const bool right = found == ReferenceDecoder::Found::kFrame && is_message();
+    damaged_ += found != ReferenceDecoder::Found::kNothing && !right;
+    expect(right || !message, "accepts no frame but a right one");
+    expect(message || !right, "accepts each right frame");
     expect(receiver_.damaged() == damaged_, "counts each damaged frame once");
-    if (!accepted)
+    if (!message)
       return;
     const Inside& inside = reference_.inside();
     const protocol::HostHeader& header = receiver_.header();
@@ -53,7 +74,6 @@ class Duel {
            "hands out the payload that was sent");
   }
 
- private:
   bool is_message() const {
     const Inside& inside = reference_.inside();
     const auto type = static_cast<protocol::MessageType>(inside.bytes[0]);
@@ -64,6 +84,9 @@ class Duel {
   ReferenceDecoder reference_;
   uint8_t damaged_ = 0;
   uint32_t pushed_ = 0;
+  const size_t piece_;
+  size_t size_ = 0;
+  uint8_t buffer_[kPieceMax];
 };
 
 // With a header's type, its one length: otherwise a fuzzer rarely finds the two together.
@@ -87,7 +110,7 @@ size_t sealed(Input& input, size_t size, uint8_t* wire) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace setae::fuzz;
   Input input(data, size);
-  Duel duel;
+  Duel duel(1 + input.byte() % kPieceMax);
   while (input.more() && duel.pushed() < kEnough) {
     const uint8_t part = input.byte();
     const size_t length = part >> 2;
@@ -106,5 +129,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       duel.push(static_cast<uint8_t>(wire[i] ^ (flip ? 1 << (where & 7) : 0)));
     }
   }
+  duel.flush();
   return 0;
 }

@@ -202,9 +202,13 @@ void Script::enable(uint8_t variant) {
 void Script::segments(uint8_t variant) {
   protocol::Segments message = {};
   message.epoch = epoch();
-  message.count = variant < 5 ? variant + 1 : variant == 7 ? input_.byte() : 1;
+  message.count = variant < 5 ? variant + 1 : variant == 7 ? input_.byte() : 5;
   for (uint8_t i = 0; i < message.count && i < protocol::kSegmentsPerMessage; ++i) {
     protocol::Segment& segment = message.segments[i];
+    if (i != 0 && variant > 4) {  // all alike, to fill the queue with few bytes
+      segment = message.segments[0];
+      continue;
+    }
     pose(segment.target_ticks);
     segment.duration_frames = duration_frames(end_ticks_, segment.target_ticks);
     memcpy(end_ticks_, segment.target_ticks, sizeof(end_ticks_));
