@@ -22,6 +22,13 @@ to do about it; both parts are also attributes::
     ├── PoseUnknownError
     ├── DeadlineError (TimeoutError)
     ├── StageError
+    │   ├── ArmUnreachableError
+    │   ├── ArmModeError
+    │   ├── ArmRemoteError
+    │   ├── ArmSafetyError
+    │   ├── ArmFrozenError
+    │   ├── ArmStoppedError
+    │   └── ArmBoxError
     ├── SimulatorMissingError
     ├── LogError
     └── ExtraMissingError
@@ -32,6 +39,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 __all__ = [
+    "ArmBoxError",
+    "ArmFrozenError",
+    "ArmModeError",
+    "ArmRemoteError",
+    "ArmSafetyError",
+    "ArmStoppedError",
+    "ArmUnreachableError",
     "BoardResetError",
     "BoardSilentError",
     "ConfigError",
@@ -317,6 +331,81 @@ class StageError(SetaeError):
     Examples of when it happens: its controller froze, is in protective stop, or
     isn't in remote mode.
     """
+
+
+class ArmUnreachableError(StageError):
+    """Nothing that is a UR controller answers at the address.
+
+    Examples of when it happens: the controller is off, the cable or the address is
+    wrong, a firewall stands between.
+    """
+
+    default_remedy = "Check the address, the cable and that the controller is on: `ping` it."
+
+
+class ArmModeError(StageError):
+    """The arm can't move: it is not powered, or its brakes are on.
+
+    Examples of when it happens: nobody has pressed ON and START on the pendant yet.
+    """
+
+    default_remedy = "Switch the arm on with the pendant (ON, then START), and try again."
+
+
+class ArmRemoteError(StageError):
+    """The controller does not take commands from outside.
+
+    Examples of when it happens: the pendant's mode is Local.
+    """
+
+    default_remedy = (
+        "Enable remote control in the pendant's settings (System, Remote Control), then choose"
+        " Remote at its top right."
+    )
+
+
+class ArmSafetyError(StageError):
+    """The arm's safety system has stopped it.
+
+    Examples of when it happens: a protective stop after a collision, an emergency
+    stop, an open safeguard.
+    """
+
+    default_remedy = (
+        "Look at what the pendant says, make the place safe, then release the stop there. The"
+        " robot stays stopped; start the run again."
+    )
+
+
+class ArmFrozenError(StageError):
+    """The controller has stopped telling where the arm is, or takes no commands.
+
+    Examples of when it happens: the controller crashed, the network broke.
+    """
+
+    default_remedy = (
+        "Nobody knows whether the arm still moves: use the emergency stop if it does. Then look"
+        " at the pendant and the network."
+    )
+
+
+class ArmStoppedError(StageError):
+    """The arm did not get to where it was sent.
+
+    Examples of when it happens: someone stopped the program or set the speed slider
+    to zero, the host stalled and the controller's watchdog stopped the arm.
+    """
+
+    default_remedy = "Look at the pendant; then start the run again."
+
+
+class ArmBoxError(StageError):
+    """A target lies outside the box in which the arm may carry the robot.
+
+    Examples of when it happens: the start is lower than thought.
+    """
+
+    default_remedy = "Start elsewhere, or change box_min_mm and box_max_mm in [ur]."
 
 
 class SimulatorMissingError(SetaeError):

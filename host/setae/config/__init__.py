@@ -19,6 +19,7 @@ from setae.config.sections import (
     Spring,
     Stage,
     Tube,
+    Ur,
 )
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "Spring",
     "Stage",
     "Tube",
+    "Ur",
     "load",
     "loads",
 ]

@@ -178,6 +178,48 @@ class Stage(Section):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Ur(Section):
+    """A Universal Robots arm as the stage, and where it may carry the robot.
+
+    Attributes
+    ----------
+    frame_d_mm, frame_d_rotation_deg
+        Pose of frame D on the flange: origin, and rotation vector (axis times angle).
+        D's z axis points along the spring, away from the flange.
+    payload_kg, payload_centre_mm
+        What hangs from the flange, and its centre of mass in the flange's frame.
+    box_min_mm, box_max_mm
+        Corners of the box that frame D's origin stays in, in the arm's base frame as
+        the pendant shows it.
+    state_age_s
+        Age of the arm's last state above which the controller counts as frozen.
+    command_deadline_s
+        Longest time for the controller to take a command.
+    watchdog_hz
+        The controller stops the arm by itself where it hears less often from the host.
+    tilt_max_deg
+        Most that frame D's z axis may be off straight down.
+    """
+
+    frame_d_mm: tuple[float, ...] = key(low=-2000, high=2000, count=(3, 3))
+    frame_d_rotation_deg: tuple[float, ...] = key(low=-360, high=360, count=(3, 3))
+    payload_kg: float = key(low=0, high=100)
+    payload_centre_mm: tuple[float, ...] = key(low=-1000, high=1000, count=(3, 3))
+    box_min_mm: tuple[float, ...] = key(low=-3000, high=3000, count=(3, 3))
+    box_max_mm: tuple[float, ...] = key(low=-3000, high=3000, count=(3, 3))
+    state_age_s: float = key(low=0.05, high=10)
+    command_deadline_s: float = key(low=0.1, high=60)
+    watchdog_hz: float = key(low=0.5, high=50)
+    tilt_max_deg: float = key(low=0, high=180)
+
+    def _contradiction(self) -> str:
+        for axis, low, high in zip("xyz", self.box_min_mm, self.box_max_mm, strict=True):
+            if not low < high:
+                return f"{axis}: box_min_mm = {low:g} must be below box_max_mm = {high:g}."
+        return ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Explore(Section):
     """The exploration of a tube, section III-D of the paper.
 
@@ -234,6 +276,7 @@ SECTIONS: dict[str, type[Section]] = {
     "motion": Motion,
     "bristle": Bristle,
     "stage": Stage,
+    "ur": Ur,
     "explore": Explore,
     "tube": Tube,
 }
@@ -245,7 +288,7 @@ class Config:
 
     Attributes
     ----------
-    geometry, spring, servo, motion, bristle, stage, explore, tube
+    geometry, spring, servo, motion, bristle, stage, ur, explore, tube
         The sections.
     simulator
         Parameters of the simulator, (its own name, value), sorted by name; they stand
@@ -266,6 +309,7 @@ class Config:
     motion: Motion
     bristle: Bristle
     stage: Stage
+    ur: Ur
     explore: Explore
     tube: Tube
     simulator: tuple[tuple[str, float], ...] = ()

@@ -1,0 +1,240 @@
+"""The arm's controller, through ur-rtde: what is asked of it, and what it tells."""
+
+from __future__ import annotations
+
+import math
+import socket
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any, Final
+
+from setae.config import Ur
+from setae.errors import (
+    ArmModeError,
+    ArmRemoteError,
+    ArmSafetyError,
+    ArmStoppedError,
+    ArmUnreachableError,
+    ExtraMissingError,
+    StageError,
+)
+
+__all__ = ["RUNNING", "ArmState", "Controller", "check"]
+
+# Robot modes and safety modes of UR's RTDE guide.
+RUNNING: Final = 7
+_MODES: Final = {
+    -1: "has no safety board", 0: "is disconnected", 1: "waits for a safety confirmation",
+    2: "is booting", 3: "is switched off", 4: "is switching on", 5: "has its brakes on",
+    6: "is in backdrive", 8: "is updating its firmware",
+}  # fmt: skip
+_SAFE: Final = (1, 2)  # normal, reduced
+_STOPS: Final = {
+    3: "It is in protective stop.", 4: "It is in recovery mode.", 5: "A safeguard stop is active.",
+    6: "The emergency stop is pressed.", 7: "The robot's emergency stop is pressed.",
+    8: "A safety limit was violated.", 9: "Its safety system is in fault.",
+}  # fmt: skip
+
+_STATE_HZ: Final = 125.0
+_RTDE_PORT: Final = 30004
+_CONNECT_TIMEOUT_S: Final = 3.0
+_PROGRAM_POLL_S: Final = 0.01
+_FIELDS: Final = [
+    "timestamp", "actual_TCP_pose", "actual_TCP_speed", "robot_mode", "safety_mode",
+    "runtime_state",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmState:
+    """What the controller last told.
+
+    Attributes
+    ----------
+    timestamp_s
+        The controller's own time; a new state has a new one.
+    pose
+        Frame D in the base frame: x, y, z in mm, rotation vector in rad; (6,).
+    speed_mm_s
+        Of frame D's origin.
+    robot_mode, safety_mode
+        UR's numbers.
+    """
+
+    timestamp_s: float
+    pose: tuple[float, ...]
+    speed_mm_s: float
+    robot_mode: int
+    safety_mode: int
+
+
+def check(state: ArmState) -> None:
+    """Raise ArmModeError or ArmSafetyError where the arm can't move."""
+    if state.safety_mode not in _SAFE:
+        what = _STOPS.get(state.safety_mode, f"Its safety mode is {state.safety_mode}.")
+        raise ArmSafetyError(f"The arm's safety system stopped it. {what}")
+    if state.robot_mode != RUNNING:
+        what = _MODES.get(state.robot_mode, f"is in mode {state.robot_mode}")
+        raise ArmModeError(f"The arm {what}.")
+
+
+@dataclass(frozen=True, slots=True)
+class _Libraries:
+    control: ModuleType
+    receive: ModuleType
+    dashboard: ModuleType
+
+
+def _load_libraries() -> _Libraries:
+    """Import ur-rtde; raises ExtraMissingError where it isn't installed."""
+    try:
+        import dashboard_client
+        import rtde_control
+        import rtde_receive
+    except ImportError as error:
+        raise ExtraMissingError("ur", "Driving a UR arm") from error
+    return _Libraries(rtde_control, rtde_receive, dashboard_client)
+
+
+class Controller:
+    """A UR controller. Every method but `state` may hang: call it in a `Worker`.
+
+    Parameters
+    ----------
+    host
+        Its address.
+    settings
+        Frame D on the flange, payload and watchdog.
+    """
+
+    def __init__(self, host: str, settings: Ur) -> None:
+        self._host = host
+        self._settings = settings
+        self._receive: Any = None
+        self._control: Any = None
+
+    def connect(self) -> None:
+        """Connect, check that the arm may move, and tell it what it carries.
+
+        Raises
+        ------
+        ExtraMissingError
+            ur-rtde isn't installed.
+        ArmUnreachableError, ArmRemoteError, ArmModeError, ArmSafetyError
+            Why it can't be driven.
+        """
+        libraries = _load_libraries()
+        # The library itself waits far longer, and says less.
+        try:
+            socket.create_connection((self._host, _RTDE_PORT), _CONNECT_TIMEOUT_S).close()
+        except OSError as error:
+            raise ArmUnreachableError(
+                f"No UR controller answers at {self._host}: {error.strerror or error}."
+            ) from error
+        self._require_remote(libraries)
+        self._receive = self._call(
+            "the state", lambda: libraries.receive.RTDEReceiveInterface(
+                self._host, _STATE_HZ, _FIELDS
+            )
+        )  # fmt: skip
+        check(self.state())
+        self._control = self._call(
+            "control", lambda: libraries.control.RTDEControlInterface(self._host, _STATE_HZ)
+        )
+        self._call("its load", self._prepare)
+
+    def _require_remote(self, libraries: _Libraries) -> None:
+        dashboard = libraries.dashboard.DashboardClient(self._host)
+        try:
+            dashboard.connect(int(_CONNECT_TIMEOUT_S * 1000))
+            remote = dashboard.isInRemoteControl()
+        except RuntimeError as error:
+            raise ArmUnreachableError(
+                f"The dashboard of the controller at {self._host} does not answer: {error}."
+            ) from error
+        finally:
+            dashboard.disconnect()
+        if not remote:
+            raise ArmRemoteError(f"The controller at {self._host} is in local control.")
+
+    def _prepare(self) -> None:
+        settings = self._settings
+        rotation_rad = [math.radians(angle) for angle in settings.frame_d_rotation_deg]
+        self._control.setTcp([*(value / 1000 for value in settings.frame_d_mm), *rotation_rad])
+        self._control.setPayload(
+            settings.payload_kg, [value / 1000 for value in settings.payload_centre_mm]
+        )
+        self._control.setWatchdog(settings.watchdog_hz)
+
+    def _call(self, what: str, call: Callable[[], Any]) -> Any:
+        try:
+            return call()
+        except RuntimeError as error:
+            raise ArmUnreachableError(
+                f"The controller at {self._host} failed at {what}: {error}."
+            ) from error
+
+    def state(self) -> ArmState:
+        """What the controller last told; never waits."""
+        receive = self._receive
+        x, y, z, *turn = receive.getActualTCPPose()
+        return ArmState(
+            timestamp_s=receive.getTimestamp(),
+            pose=(1000 * x, 1000 * y, 1000 * z, *turn),
+            speed_mm_s=1000 * math.hypot(*receive.getActualTCPSpeed()[:3]),
+            robot_mode=receive.getRobotMode(),
+            safety_mode=receive.getSafetyMode(),
+        )
+
+    def program_runs(self) -> bool:
+        """Whether the controller still takes moves; never waits."""
+        return bool(self._control.isProgramRunning())
+
+    def kick_watchdog(self) -> None:
+        """Tell the controller that the host lives."""
+        self._call("a sign of life", self._control.kickWatchdog)
+
+    def move(self, pose: Sequence[float], speed_mm_s: float, acceleration_mm_s2: float) -> None:
+        """Start a straight move of frame D; x, y, z in mm, rotation vector in rad.
+
+        Raises
+        ------
+        StageError
+            The controller did not take it.
+        """
+        # A watchdog that was not fed between two moves ended the program.
+        if not self.program_runs():
+            self._call("a new program", self._control.reuploadScript)
+            self._wait_for_program()
+            self._call("its load", self._prepare)
+        target = [*(value / 1000 for value in pose[:3]), *pose[3:]]
+        taken = self._call(
+            "a move",
+            lambda: self._control.moveL(
+                target, speed_mm_s / 1000, acceleration_mm_s2 / 1000, True
+            ),
+        )
+        if not taken:
+            raise StageError("The arm's controller refused the move.", "Look at the pendant.")
+
+    def _wait_for_program(self) -> None:
+        """The upload comes back before the program runs; until then commands fail."""
+        end_s = time.monotonic() + self._settings.command_deadline_s / 2
+        while not self.program_runs():
+            if time.monotonic() > end_s:
+                raise ArmStoppedError("The arm's controller does not start its program.")
+            time.sleep(_PROGRAM_POLL_S)
+
+    def brake(self, deceleration_mm_s2: float) -> None:
+        """Start braking."""
+        self._call("a stop", lambda: self._control.stopL(deceleration_mm_s2 / 1000, True))
+
+    def close(self) -> None:
+        """End the program on the controller and let go of it."""
+        if self._control is not None:
+            self._control.stopScript()
+            self._control.disconnect()
+        if self._receive is not None:
+            self._receive.disconnect()

@@ -1,0 +1,327 @@
+"""A UR arm as a `setae.stage.Stage`.
+
+Nothing here waits for the arm: moves are started and then watched. The library's calls
+are made in a thread of their own (`setae.ur.worker`), and the age of the controller's
+state is what tells that it lives.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final, Self
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from setae.config import Config
+from setae.errors import (
+    ArmBoxError,
+    ArmFrozenError,
+    ArmStoppedError,
+    InputError,
+    StageError,
+)
+from setae.ur.controller import ArmState, Controller, check
+from setae.ur.pose import WorldFrame
+from setae.ur.worker import Job, Worker
+
+__all__ = ["SCHEME", "UrStage"]
+
+SCHEME: Final = "ur://"
+
+_CONNECT_TIMEOUT_S: Final = 15.0
+_GOODBYE_TIMEOUT_S: Final = 3.0  # the library takes more than one
+# Arrived: this near, this slow. The controller itself is ten times as exact.
+_NEAR_MM: Final = 0.2
+_REST_MM_S: Final = 1.0
+# At rest this long away from its target, the arm was stopped by something else.
+_STUCK_S: Final = 1.0
+# The host itself may stall; what counts is what it saw of the controller.
+_GAP_MAX_S: Final = 0.05
+
+
+@dataclass(slots=True)
+class _Move:
+    target_mm: tuple[float, float, float]
+    job: Job[None]
+    resting_since_s: float | None = None
+
+
+class UrStage:
+    """A stage that is a UR arm, connected when it is made.
+
+    The world begins where frame D is then: its origin is D's, x is D's x axis, z points
+    up. The arm keeps its orientation.
+
+    Parameters
+    ----------
+    url
+        ``ur://ADDRESS``.
+    config
+        Section ``[ur]`` and the speeds of ``[stage]``.
+    clock
+        Seconds, real ones: the controller lives in them.
+
+    Raises
+    ------
+    ArmUnreachableError, ArmRemoteError, ArmModeError, ArmSafetyError
+        Why the arm can't be driven, and what to do.
+    ArmBoxError
+        Frame D is outside the box now.
+    StageError
+        Frame D doesn't hang straight down.
+    ExtraMissingError
+        ur-rtde isn't installed.
+    """
+
+    def __init__(
+        self, url: str, config: Config, *, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        host = urlsplit(url).hostname if url.startswith(SCHEME) else None
+        if not host:
+            raise InputError(f"{url!r} names no arm.", "Give ur:// and its address: ur://10.0.0.7")
+        self.name = f"{SCHEME}{host}"
+        self._config = config
+        self._settings = config.ur
+        self._clock = clock
+        self._worker = Worker(clock)
+        self._controller = Controller(host, config.ur)
+        try:
+            connecting = self._worker.submit("connecting", self._controller.connect)
+            connecting.wait(_CONNECT_TIMEOUT_S)
+            self._state = self._settled_state()
+            self._world = WorldFrame.at(self._state.pose)
+            self._require_straight()
+            self._require_inside(self._state.pose[:3], "Frame D is")
+        except BaseException:
+            self.close()
+            raise
+        self._unseen_s = 0.0
+        self._polled_s = clock()
+        self._move: _Move | None = None
+        self._braking: Job[None] | None = None
+        self._kick: Job[None] | None = None
+        self._failure: StageError | None = None
+
+    def _settled_state(self) -> ArmState:
+        """A state in which frame D is what the configuration says: two states on."""
+        state = self._controller.state()
+        end_s = self._clock() + self._settings.command_deadline_s
+        seen = 0
+        while seen < 2:
+            newer = self._worker.submit("its state", self._controller.state).wait(
+                self._settings.command_deadline_s
+            )
+            seen += newer.timestamp_s != state.timestamp_s
+            state = newer
+            if self._clock() > end_s:
+                raise ArmFrozenError("The arm's controller answers, but does not tell its state.")
+        return state
+
+    def _require_straight(self) -> None:
+        tilt_deg = math.degrees(self._world.tilt_rad)
+        if tilt_deg > self._settings.tilt_max_deg:
+            raise StageError(
+                f"Frame D is {tilt_deg:.1f}° off straight down, and"
+                f" {self._settings.tilt_max_deg:g}° are allowed.",
+                "Turn the flange with the pendant, or correct frame_d_rotation_deg in [ur].",
+            )
+
+    def _require_inside(self, base_mm: Sequence[float], what: str) -> None:
+        limits = zip(
+            "xyz", base_mm, self._settings.box_min_mm, self._settings.box_max_mm, strict=True
+        )
+        for axis, value_mm, low_mm, high_mm in limits:
+            if not low_mm <= value_mm <= high_mm:
+                raise ArmBoxError(
+                    f"{what} at {axis} = {value_mm:.1f} mm in the arm's base frame; the box goes"
+                    f" from {low_mm:g} to {high_mm:g} mm."
+                )
+
+    # ---------------------------------------------------------------------------- stage
+
+    @property
+    def position_mm(self) -> tuple[float, float, float]:
+        """Where the origin of frame D was when the controller last told."""
+        return self._world.to_world_mm(self._state.pose[:3])
+
+    @property
+    def moving(self) -> bool:
+        """True from `move_to` until the arm is at its target, or rests after `stop`."""
+        return self._move is not None or self._braking is not None
+
+    @property
+    def state_age_s(self) -> float:
+        """For how long the host has watched without a new state."""
+        return self._unseen_s
+
+    def require_reachable(self, position_mm: Sequence[float]) -> None:
+        """Raise ArmBoxError where a target in the world lies outside the box."""
+        self._require_inside(self._world.to_base_mm(position_mm).tolist(), "The target is")
+
+    def move_to(
+        self,
+        position_mm: Sequence[float],
+        *,
+        speed_mm_s: float | None = None,
+        acceleration_mm_s2: float | None = None,
+    ) -> None:
+        """Start a straight move; returns at once.
+
+        Parameters
+        ----------
+        position_mm
+            Target of frame D's origin in the world, (3,).
+        speed_mm_s, acceleration_mm_s2
+            Bounds of the move; None takes those of ``[stage]``.
+
+        Raises
+        ------
+        ArmBoxError
+            The target lies outside the box.
+        StageError
+            The arm is moving, has failed before, or a value is no good.
+        """
+        if self._failure is not None:
+            raise self._failure
+        bounds = self._config.stage
+        speed = bounds.speed_mm_s if speed_mm_s is None else speed_mm_s
+        acceleration = (
+            bounds.acceleration_mm_s2 if acceleration_mm_s2 is None else acceleration_mm_s2
+        )
+        target = np.asarray(position_mm, dtype=np.float64)
+        if target.shape != (3,) or not np.isfinite(target).all():
+            raise StageError(f"The arm can't go to {position_mm}.", "Give three numbers, in mm.")
+        for name, value in (("speed_mm_s", speed), ("acceleration_mm_s2", acceleration)):
+            if not (math.isfinite(value) and value > 0):
+                raise StageError(f"{name} is {value}.", "Give a positive number.")
+        if self.moving:
+            raise StageError("The arm is moving already.", "Wait for it, or stop it first.")
+        self.require_reachable(target.tolist())
+        pose = [*self._world.to_base_mm(target.tolist()).tolist(), *self._state.pose[3:]]
+        job = self._worker.submit(
+            "a move", lambda: self._controller.move(pose, speed, acceleration)
+        )
+        x_mm, y_mm, z_mm = target.tolist()
+        self._move = _Move((x_mm, y_mm, z_mm), job)
+
+    def stop(self) -> None:
+        """Brake now; returns without waiting for rest.
+
+        Raises
+        ------
+        StageError
+            The controller is lost: the arm's own watchdog is what stops it.
+        """
+        if isinstance(self._failure, ArmFrozenError):
+            raise ArmFrozenError("The arm can't be told to stop: its controller does not answer.")
+        self._move = None
+        deceleration = self._config.stage.acceleration_mm_s2
+        self._braking = self._worker.submit(
+            "a stop", lambda: self._controller.brake(deceleration)
+        )
+
+    def poll(self, now_us: int) -> None:
+        """Look at the arm; never waits.
+
+        Raises
+        ------
+        ArmFrozenError, ArmSafetyError, ArmModeError, ArmStoppedError, StageError
+            What has failed; once. After that `move_to` raises it.
+        """
+        del now_us  # the controller lives in real time, also beside a simulated robot
+        if self._failure is not None:
+            return
+        try:
+            self._look()
+        except StageError as failure:
+            self._failure = failure
+            self._move = self._braking = None
+            raise
+
+    def _look(self) -> None:
+        now_s = self._clock()
+        state = self._controller.state()
+        gap_s, self._polled_s = now_s - self._polled_s, now_s
+        if state.timestamp_s != self._state.timestamp_s:
+            self._unseen_s = 0.0
+        else:
+            self._unseen_s += min(gap_s, _GAP_MAX_S)
+        self._state = state
+        if self._unseen_s > self._settings.state_age_s:
+            raise ArmFrozenError(
+                f"The arm's controller has told nothing for {self._unseen_s:.2f} s."
+            )
+        check(state)
+        self._feed_watchdog()
+        if self._braking is not None:
+            self._watch_braking(self._braking, now_s)
+        if self._move is not None:
+            self._watch_move(self._move, now_s)
+
+    def _feed_watchdog(self) -> None:
+        if self._kick is not None:
+            if not self._kick.done:
+                return
+            self._kick.result()
+        self._kick = self._worker.submit("a sign of life", self._controller.kick_watchdog)
+
+    def _watch_braking(self, braking: Job[None], now_s: float) -> None:
+        if self._taken(braking, now_s) and self._state.speed_mm_s < _REST_MM_S:
+            self._braking = None
+
+    def _watch_move(self, move: _Move, now_s: float) -> None:
+        if not self._taken(move.job, now_s):
+            return
+        left_mm = math.dist(self.position_mm, move.target_mm)
+        if self._state.speed_mm_s >= _REST_MM_S:
+            move.resting_since_s = None
+        elif left_mm < _NEAR_MM:
+            self._move = None
+        elif move.resting_since_s is None:
+            move.resting_since_s = now_s
+        elif now_s - move.resting_since_s > _STUCK_S:
+            why = (
+                "the speed slider may be at zero"
+                if self._controller.program_runs()
+                else "its program has ended"
+            )
+            raise ArmStoppedError(f"The arm rests {left_mm:.1f} mm before its target: {why}.")
+
+    def _taken(self, job: Job[None], now_s: float) -> bool:
+        """Whether the controller took a command; raises where it takes too long, or failed."""
+        if job.done:
+            job.result()
+            return True
+        if now_s - job.submitted_s > self._settings.command_deadline_s:
+            raise ArmFrozenError(
+                f"The arm's controller did not take {job.what} within"
+                f" {self._settings.command_deadline_s:g} s."
+            )
+        return False
+
+    # -------------------------------------------------------------------------- closing
+
+    def close(self) -> None:
+        """Let go of the arm; it stays where it is. Closing twice is fine."""
+        goodbye = self._worker.submit("goodbye", self._controller.close)
+        self._worker.close()
+        # A dead controller never answers; the program may end all the same.
+        with contextlib.suppress(StageError, RuntimeError):
+            goodbye.wait(_GOODBYE_TIMEOUT_S)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
