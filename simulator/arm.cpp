@@ -31,6 +31,21 @@ void Arm::move(int64_t now_us, const Vec3& target_mm, double speed_mm_s,
               {ramp_s, -acceleration_mm_s2}}};
 }
 
+void Arm::follow(int64_t now_us, const Vec3& target_mm, int64_t duration_us) {
+  place(position_mm(now_us));
+  start_us_ = now_us;
+  start_speed_mm_s_ = 0;
+  const Vec3 way = target_mm - start_mm_;
+  distance_mm_ = norm(way);
+  if (distance_mm_ == 0)
+    return;
+  target_mm_ = target_mm;
+  direction_ = (1 / distance_mm_) * way;
+  const double duration_s = 1e-6 * static_cast<double>(duration_us);
+  start_speed_mm_s_ = distance_mm_ / duration_s;
+  phases_[0] = {duration_s, 0};
+}
+
 void Arm::stop(int64_t now_us, double acceleration_mm_s2) {
   const Motion motion = at(now_us);
   if (motion.ended)

@@ -17,6 +17,8 @@ class Arm {
 
   // The arm must be at rest.
   void move(int64_t now_us, const Vec3& target_mm, double speed_mm_s, double acceleration_mm_s2);
+  // Goes there at an even speed: where something outside the world moves the arm.
+  void follow(int64_t now_us, const Vec3& target_mm, int64_t duration_us);
   // Brakes on the present line, never beyond its end.
   void stop(int64_t now_us, double acceleration_mm_s2);
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib.metadata
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -29,8 +29,9 @@ from setae.link.transport import Transport
 from setae.record import Recorder
 from setae.robot import Robot
 from setae.scene import Scene, tube_scene
-from setae.sim import SimTransport, SimulatedStage, World, plants, plugin
+from setae.sim import Follower, SimTransport, SimulatedStage, World, plants, plugin
 from setae.stage import ManualStage, Stage
+from setae.ur import UrStage
 from setae_protocol.messages import (
     PRESSURE_LSB_PER_HPA,
     PROTOCOL_VERSION,
@@ -170,7 +171,7 @@ def open(  # noqa: A001  # rig.open() is what it does
     config: Config | None = None,
     seed: int = 0,
     scene: Scene | None = None,
-    stage: Stage | None = None,
+    stage: Stage | str | None = None,
     leave: Leave = "relax",
     pollables: Sequence[Pollable] = (),
 ) -> Rig:
@@ -184,8 +185,10 @@ def open(  # noqa: A001  # rig.open() is what it does
         What the simulated robot hangs in; None: the empty tube. A real robot
         hangs in what is there; the scene then only goes into the log.
     stage
-        The arm. None: the simulated one, or for a real robot a person
-        (`setae.stage.ManualStage`).
+        The arm, or ``ur://ADDRESS`` for a UR arm (`setae.ur.UrStage`). None: the
+        simulated one, or for a real robot a person (`setae.stage.ManualStage`). A
+        simulated robot on a real arm lives in real time, and the simulated arm follows
+        the real one.
 
     Returns
     -------
@@ -194,11 +197,34 @@ def open(  # noqa: A001  # rig.open() is what it does
     """
     config = config or load()
     scene = scene or tube_scene(config)
+    if isinstance(stage, str):
+        with ExitStack() as undo:
+            arm = undo.enter_context(UrStage(stage, config))
+            opened = _open(url, config, seed, scene, arm, leave, pollables, arm_is_real=True)
+            opened.closes(undo.pop_all())
+            return opened
+    return _open(url, config, seed, scene, stage, leave, pollables, arm_is_real=False)
+
+
+def _open(
+    url: str | None,
+    config: Config,
+    seed: int,
+    scene: Scene,
+    stage: Stage | None,
+    leave: Leave,
+    pollables: Sequence[Pollable],
+    *,
+    arm_is_real: bool,
+) -> Rig:
+    followers: list[Pollable] = []
     if url is not None and url.startswith(("sim://", plugin.PREFIX)):
         foreign = url if url.startswith(plugin.PREFIX) else None
         seed = seed if foreign else _seed(url, seed)
         world = _world(config, scene, seed, foreign)
-        transport: Transport = SimTransport(world)
+        transport: Transport = SimTransport(world, speed=1.0 if arm_is_real else None)
+        if stage is not None and arm_is_real:
+            followers.append(Follower(world, stage))
         stage = stage or SimulatedStage(world, config.stage)
         session_id: int | None = seed % 255 + 1
     else:
@@ -206,7 +232,7 @@ def open(  # noqa: A001  # rig.open() is what it does
         transport = SerialTransport(url or find_port())
         stage = stage or ManualStage()
         session_id = None
-    session = Session(transport, session_id=session_id, pollables=[stage, *pollables])
+    session = Session(transport, session_id=session_id, pollables=[stage, *followers, *pollables])
     try:
         session.open()
         robot = Robot(session, config, leave=leave)
@@ -298,6 +324,11 @@ class Rig:
         self.plant = plant
         self.world = world
         self._log: _Log | None = None
+        self._open = ExitStack()
+
+    def closes(self, context: ExitStack) -> None:
+        """Have this left together with the rig, last."""
+        self._open.push(context)
 
     def __enter__(self) -> Self:
         return self
@@ -313,8 +344,9 @@ class Rig:
                 self._stop_stage(error)
             self.robot.__exit__(kind, error, traceback)
         finally:
-            # Last, so that the log holds how the robot was left.
+            # After it, so that the log holds how the robot was left.
             self._close_log(error)
+            self._open.close()
 
     def _stop_stage(self, error: BaseException) -> None:
         try:

@@ -137,14 +137,20 @@ class Fake:
         self.speed = np.zeros(3)
 
     def tcp_m(self) -> NDArray[np.float64]:
-        offset: NDArray[np.float64] = np.array(self.flange_m) + rotation(self.turn_rad) @ self.tcp[:3]
+        offset: NDArray[np.float64] = (
+            np.array(self.flange_m) + rotation(self.turn_rad) @ self.tcp[:3]
+        )
         return offset
 
     def step(self, step_s: float) -> None:
         """Let a little time pass."""
         if self.playing:
             self._converse()
-            starved = time.monotonic() - self.heard_s > 1 / self.watchdog_hz if self.watchdog_hz else False
+            starved = (
+                time.monotonic() - self.heard_s > 1 / self.watchdog_hz
+                if self.watchdog_hz
+                else False
+            )
             if starved:
                 self.playing = False
                 self.halt()
@@ -176,7 +182,6 @@ class Fake:
             return
         values = [float(self.inputs.get(f"input_double_register_{i}", 0.0)) for i in range(12)]
         self.done = True
-        print(command, values, file=sys.stderr)
         if command == MOVE_L:
             self.target_m = np.array(values[:3])
             self.speed_max, self.acceleration = values[6], values[7]
@@ -350,7 +355,8 @@ async def main(address: str) -> None:
         while line := await lines.readline():
             fake.obey(line.decode())
 
-    print("ready", flush=True)
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
     listening = asyncio.create_task(listen())
     last_s = time.monotonic()
     while not listening.done():  # until whoever started it is gone

@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from setae import rig
+from setae.cli.arm import show_arm_targets
 from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.cli.runs import STOPPED, later, say, what_is_left, write_report
 from setae.config import Config
@@ -22,6 +23,7 @@ from setae.experiments.explore import (
     Event,
     ExploreResult,
     OnEvent,
+    arm_targets_mm,
     paper_obstacles,
     reach_below_tip_mm,
     run_trials,
@@ -44,6 +46,8 @@ def explore(
     force: Flag = False,
     report: bool = True,
     accept_jump: Flag = False,
+    stage: str | None = None,
+    dry_run: Flag = False,
     where: Where | None = None,
 ) -> None:
     """Explore a tube: step down, feel in eight directions, stop at an obstacle.
@@ -70,14 +74,22 @@ def explore(
     accept_jump
         Enable the servos though nobody knows where they are, or they were left where the
         configuration doesn't allow them: the first pulse may move them at full speed.
+    stage
+        The arm that carries the robot: ur://ADDRESS. Without it a simulated robot has a
+        simulated arm, and a real one a person who moves it.
+    dry_run
+        Connect to the arm, show where it would go, and move nothing.
     where
         Which robot.
     """
     where = where or Where()
     config = where.load()
     obstacles = _obstacles(config, obstacle, azimuth, trials)
-    simulated = where.simulated
+    by_hand = stage is None and not where.simulated
     targets_mm(config)  # what the robot can't reach is told before anything begins
+    if dry_run:
+        show_arm_targets(stage, config, arm_targets_mm(config))
+        return
     progress = _Progress(len(obstacles))
     logs: list[Path] = []
 
@@ -95,7 +107,7 @@ def explore(
                 config=config,
                 seed=where.seed + number - 1,
                 scene=tube_scene(config, what),
-                stage=None if simulated else ManualStage(ask=say),
+                stage=ManualStage(ask=say) if by_hand else stage,
                 pollables=[interrupts],
             ) as opened,
         ):
@@ -103,8 +115,8 @@ def explore(
             log = folder() / f"trial-{number}.mcap"
             if force:
                 log.unlink(missing_ok=True)
-            if not simulated:
-                _ask_to_place(opened.robot, what)
+            if not where.simulated:
+                _ask_to_place(opened.robot, what, by_hand=by_hand)
             recorder = opened.record(log, metadata={"experiment": "explore", "trial": number})
             logs.append(log)
             opened.robot.enable(accept_jump=accept_jump)
@@ -117,7 +129,7 @@ def explore(
 
     try:
         results = run_trials(
-            setup, obstacles=obstacles, arm_timeout_s=None if simulated else _MANUAL_TIMEOUT_S
+            setup, obstacles=obstacles, arm_timeout_s=_MANUAL_TIMEOUT_S if by_hand else None
         )
     except KeyboardInterrupt as interrupt:
         failures = getattr(interrupt, "__notes__", [])
@@ -179,7 +191,7 @@ def _obstacle(config: Config, text: str, azimuth_deg: float) -> Obstacle | None:
     return obstacle
 
 
-def _ask_to_place(robot: Robot, what: Obstacle | None) -> None:
+def _ask_to_place(robot: Robot, what: Obstacle | None, *, by_hand: bool) -> None:
     where = (
         "Take every obstacle out of the tube"
         if what is None
@@ -188,7 +200,8 @@ def _ask_to_place(robot: Robot, what: Obstacle | None) -> None:
     )
     enter = Enter()
     enter.forget()
-    say(f"{where} and bring the arm to its start, then press Enter.")
+    arm = "and bring the arm to its start" if by_hand else "without moving the arm"
+    say(f"{where} {arm}, then press Enter.")
     # In the robot's own loop: it is watched meanwhile, and Ctrl-C is heard.
     robot.wait(enter.pressed, timeout_s=_PLACE_TIMEOUT_S, what="the arm to be at its start")
 

@@ -204,6 +204,19 @@ def targets_mm(config: Config) -> tuple[Point, ...]:
     return tuple(targets)
 
 
+def arm_targets_mm(config: Config) -> tuple[Point, ...]:
+    """Where the arm goes in the world, from its start at the origin to the deepest step.
+
+    Examples
+    --------
+    >>> from setae.config import load
+    >>> arm_targets_mm(load())[-1]
+    (0.0, 0.0, -100.0)
+    """
+    settings = config.explore
+    return tuple((0.0, 0.0, 0.0 - level * settings.step_mm) for level in range(settings.steps + 1))
+
+
 def reach_below_tip_mm(config: Config) -> float:
     """How far below the compressed tip, at the arm's start, the last scan's tip gets.
 

@@ -9,11 +9,12 @@ like hardware to the rest of setae.
 from setae.sim import plants, plugin
 from setae.sim.library import SimulationError
 from setae.sim.plugin import PluginError
-from setae.sim.stage import SimulatedStage
+from setae.sim.stage import Follower, SimulatedStage
 from setae.sim.transport import SimTransport
 from setae.sim.world import SensorFault, Truth, World, parameter_names
 
 __all__ = [
+    "Follower",
     "PluginError",
     "SensorFault",
     "SimTransport",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -11,7 +12,39 @@ from setae.config import Stage as Bounds
 from setae.errors import StageError
 from setae.sim.world import World
 
-__all__ = ["SimulatedStage"]
+__all__ = ["Follower", "SimulatedStage"]
+
+# The session polls at least this often: the world's arm is that far behind.
+_FOLLOW_US = 20_000
+
+
+class HasPosition(Protocol):
+    """What moves the arm from outside."""
+
+    @property
+    def position_mm(self) -> tuple[float, float, float]:
+        """Where the origin of frame D is now."""
+        ...
+
+
+class Follower:
+    """Makes the arm of a world follow a stage that lives outside of it.
+
+    Put it behind the stage in a session's pollables.
+    """
+
+    def __init__(self, world: World, stage: HasPosition) -> None:
+        self._world = world
+        self._stage = stage
+        self._followed_mm = world.arm_mm
+
+    def poll(self, now_us: int) -> None:
+        """Send the arm to where the stage is."""
+        del now_us
+        position_mm = self._stage.position_mm
+        if position_mm != self._followed_mm:
+            self._followed_mm = position_mm
+            self._world.arm_follow(position_mm, _FOLLOW_US)
 
 
 class SimulatedStage:

@@ -212,9 +212,7 @@ class Controller:
         target = [*(value / 1000 for value in pose[:3]), *pose[3:]]
         taken = self._call(
             "a move",
-            lambda: self._control.moveL(
-                target, speed_mm_s / 1000, acceleration_mm_s2 / 1000, True
-            ),
+            lambda: self._control.moveL(target, speed_mm_s / 1000, acceleration_mm_s2 / 1000, True),
         )
         if not taken:
             raise StageError("The arm's controller refused the move.", "Look at the pendant.")

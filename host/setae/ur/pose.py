@@ -36,7 +36,10 @@ def rotation(vector_rad: Sequence[float]) -> Array:
     angle_rad = math.hypot(x, y, z)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     half_sinc = np.sinc(angle_rad / (2 * np.pi))
-    return np.eye(3) + np.sinc(angle_rad / np.pi) * cross + 0.5 * half_sinc**2 * cross @ cross
+    turned: Array = (
+        np.eye(3) + np.sinc(angle_rad / np.pi) * cross + 0.5 * half_sinc**2 * cross @ cross
+    )
+    return turned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -160,9 +160,14 @@ class UrStage:
         """For how long the host has watched without a new state."""
         return self._unseen_s
 
+    def base_mm(self, position_mm: Sequence[float]) -> tuple[float, float, float]:
+        """A point of the world in the arm's base frame, as the pendant shows it, (3,)."""
+        x_mm, y_mm, z_mm = self._world.to_base_mm(position_mm).tolist()
+        return (x_mm, y_mm, z_mm)
+
     def require_reachable(self, position_mm: Sequence[float]) -> None:
         """Raise ArmBoxError where a target in the world lies outside the box."""
-        self._require_inside(self._world.to_base_mm(position_mm).tolist(), "The target is")
+        self._require_inside(self.base_mm(position_mm), "The target is")
 
     def move_to(
         self,
@@ -203,7 +208,7 @@ class UrStage:
         if self.moving:
             raise StageError("The arm is moving already.", "Wait for it, or stop it first.")
         self.require_reachable(target.tolist())
-        pose = [*self._world.to_base_mm(target.tolist()).tolist(), *self._state.pose[3:]]
+        pose = [*self.base_mm(target.tolist()), *self._state.pose[3:]]
         job = self._worker.submit(
             "a move", lambda: self._controller.move(pose, speed, acceleration)
         )
@@ -222,9 +227,7 @@ class UrStage:
             raise ArmFrozenError("The arm can't be told to stop: its controller does not answer.")
         self._move = None
         deceleration = self._config.stage.acceleration_mm_s2
-        self._braking = self._worker.submit(
-            "a stop", lambda: self._controller.brake(deceleration)
-        )
+        self._braking = self._worker.submit("a stop", lambda: self._controller.brake(deceleration))
 
     def poll(self, now_us: int) -> None:
         """Look at the arm; never waits.

@@ -1,0 +1,66 @@
+"""A fake controller as a process of its own, so that it can freeze and die."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+_SCRIPT = Path(__file__).with_name("fake_controller.py")
+_READY_TIMEOUT_S = 30
+# ur-rtde can't be told a port: each controller has an address of its own.
+_addresses = (f"127.7.{os.getpid() % 250 + 1}.{last}" for last in itertools.count(1))
+
+
+class FakeController:
+    """A running fake; its `url` is what `--stage` takes."""
+
+    def __init__(self) -> None:
+        self.address = next(_addresses)
+        self.url = f"ur://{self.address}"
+        self._process = subprocess.Popen(
+            [sys.executable, str(_SCRIPT), self.address],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self._process.stdout is not None
+        readable, _, _ = select.select([self._process.stdout], [], [], _READY_TIMEOUT_S)
+        assert readable
+        assert self._process.stdout.readline() == "ready\n"
+
+    def tell(self, line: str) -> None:
+        """Have something go wrong; see `Fake.obey`."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(line + "\n")
+        self._process.stdin.flush()
+
+    def freeze(self) -> None:
+        """It keeps its connections, and neither answers nor moves."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def close(self) -> None:
+        """It dies."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.send_signal(signal.SIGCONT)
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
+
+
+@contextlib.contextmanager
+def controller() -> Iterator[FakeController]:
+    fake = FakeController()
+    try:
+        yield fake
+    finally:
+        fake.close()

@@ -1,0 +1,75 @@
+"""The tube's exploration with a simulated robot on a UR arm, in real time."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+
+import pytest
+from tests.ur.controller import FakeController
+
+from setae import rig
+from setae.config import Config, load
+from setae.errors import ArmFrozenError, StoppedError
+from setae.experiments.explore import Event, explore
+from setae.scene import Obstacle, tube_scene
+from setae_protocol.messages import State
+
+
+def quick(step_mm: float = 40.0) -> Config:
+    config = load()
+    settings = dataclasses.replace(config.explore, steps=1, directions=2, step_mm=step_mm)
+    return dataclasses.replace(config, explore=settings)
+
+
+def test_a_trial_finds_the_cube_and_brings_the_arm_back(fake: FakeController) -> None:
+    config = quick()
+    obstacle = Obstacle(below_tip_mm=35)
+    with rig.open(
+        "sim://", config=config, scene=tube_scene(config, obstacle), stage=fake.url
+    ) as opened:
+        opened.robot.enable()
+        result = explore(opened.robot, opened.stage, obstacle=obstacle)
+        assert [touch.alpha_deg for touch in result.contacts] == [0.0]
+        assert result.descent_mm == pytest.approx(40, abs=0.3)
+        assert opened.stage.position_mm == pytest.approx((0, 0, 0), abs=0.3)
+        assert opened.world is not None
+        opened.robot.session.run_for(100_000)
+        assert opened.world.arm_mm == pytest.approx(opened.stage.position_mm, abs=0.01)
+
+
+def test_an_arm_that_freezes_while_it_lowers_stops_the_robot(fake: FakeController) -> None:
+    config = quick()
+
+    def on_event(event: Event) -> None:
+        if event.name == "arm_lowering":
+            threading.Timer(0.3, fake.freeze).start()
+
+    with rig.open("sim://", config=config, stage=fake.url) as opened:
+        opened.robot.enable()
+        with pytest.raises(ArmFrozenError) as caught:
+            explore(opened.robot, opened.stage, on_event=on_event)
+        assert opened.robot.state is State.STOPPED
+        assert "can't be told to stop" in "".join(caught.value.__notes__)
+        with pytest.raises(StoppedError):
+            opened.robot.move_to((0, 0, 60))
+
+
+def test_a_contact_while_the_arm_lowers_stops_the_arm(fake: FakeController) -> None:
+    config = quick(step_mm=100.0)
+    # Right below: the bristle meets the cube's top while the arm comes down.
+    config = dataclasses.replace(
+        config, tube=dataclasses.replace(config.tube, cube_edge_mm=69.0, axis_offset_mm=104.0)
+    )
+    obstacle = Obstacle(below_tip_mm=30, edge_mm=69.0)
+    scene = tube_scene(config, obstacle)
+    assert scene.box is not None
+    scene = dataclasses.replace(
+        scene, box=dataclasses.replace(scene.box, centre_mm=(0.0, 0.0, scene.box.centre_mm[2]))
+    )
+    with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
+        opened.robot.enable()
+        result = explore(opened.robot, opened.stage)
+        (touch,) = result.contacts
+        assert touch.alpha_deg is None
+        assert 30 < touch.descent_mm < 50, "the arm stopped soon after the touch"

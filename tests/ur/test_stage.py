@@ -1,0 +1,243 @@
+"""The unmodified ur-rtde and the stage on it, against a stand-in for the controller."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.ur.controller import FakeController
+
+from setae.config import Config, load
+from setae.errors import (
+    ArmBoxError,
+    ArmFrozenError,
+    ArmModeError,
+    ArmRemoteError,
+    ArmSafetyError,
+    ArmStoppedError,
+    ArmUnreachableError,
+    InputError,
+    StageError,
+)
+from setae.ur import UrStage
+from setae.ur.pose import WorldFrame, rotation
+
+TIMEOUT_S = 20.0
+NEAR_MM = 0.3
+
+
+def with_ur(**changes: Any) -> Config:
+    config = load()
+    return dataclasses.replace(config, ur=dataclasses.replace(config.ur, **changes))
+
+
+@contextmanager
+def connected(fake: FakeController, **changes: Any) -> Iterator[UrStage]:
+    with UrStage(fake.url, with_ur(**changes)) as stage:
+        yield stage
+
+
+def poll_until(stage: UrStage, done: Callable[[], bool]) -> None:
+    """Poll as a session does, every few milliseconds of the controller's real time."""
+    end_s = time.monotonic() + TIMEOUT_S
+    while not done():
+        assert time.monotonic() < end_s, "did not happen"
+        stage.poll(0)
+        time.sleep(0.005)
+
+
+def far_on_its_way(stage: UrStage) -> bool:
+    return stage.position_mm[2] < -5
+
+
+def test_it_moves_to_where_it_was_sent_in_the_world_that_began_at_its_start(
+    fake: FakeController,
+) -> None:
+    with connected(fake) as stage:
+        assert stage.position_mm == pytest.approx((0, 0, 0), abs=1e-6)
+        stage.move_to((10, 5, -20))
+        assert stage.moving
+        poll_until(stage, lambda: not stage.moving)
+        assert stage.position_mm == pytest.approx((10, 5, -20), abs=NEAR_MM)
+        # The fake's flange looks down: down is down in its base frame, y points away.
+        x_mm, y_mm, z_mm = stage.base_mm((10, 5, -20))
+        assert (x_mm, y_mm, z_mm) == pytest.approx((410, 105, 480), abs=NEAR_MM)
+
+
+def test_a_stop_ends_the_move_where_it_is(fake: FakeController) -> None:
+    with connected(fake) as stage:
+        stage.move_to((0, 0, -80))
+        poll_until(stage, lambda: far_on_its_way(stage))
+        stage.stop()
+        assert stage.moving, "it brakes"
+        poll_until(stage, lambda: not stage.moving)
+        z_mm = stage.position_mm[2]
+        assert -30 < z_mm < -5
+        stage.move_to((0, 0, z_mm - 1))
+        poll_until(stage, lambda: not stage.moving)
+
+
+def test_targets_outside_the_box_are_refused_before_anything_moves(fake: FakeController) -> None:
+    with connected(fake, box_min_mm=(-900.0, -900.0, 450.0)) as stage:
+        with pytest.raises(ArmBoxError, match=r"z = 440\.0 mm in the arm's base frame"):
+            stage.move_to((0, 0, -60))
+        assert not stage.moving
+        stage.move_to((0, 0, -40))
+        poll_until(stage, lambda: not stage.moving)
+
+
+def test_a_start_outside_the_box_is_refused(fake: FakeController) -> None:
+    with pytest.raises(ArmBoxError, match="Frame D is at z"):
+        UrStage(fake.url, with_ur(box_min_mm=(-900.0, -900.0, 800.0)))
+
+
+def test_a_flange_that_does_not_look_down_is_refused(fake: FakeController) -> None:
+    fake.tell("tilt 0.2")
+    with pytest.raises(StageError, match=r"11\.5° off straight down"):
+        UrStage(fake.url, load())
+
+
+@pytest.mark.parametrize(
+    ("line", "kind", "says"),
+    [
+        ("local", ArmRemoteError, "local control"),
+        ("mode 3", ArmModeError, "switched off"),
+        ("mode 5", ArmModeError, "brakes"),
+        ("safety 3", ArmSafetyError, "protective stop"),
+        ("safety 6", ArmSafetyError, "emergency stop"),
+    ],
+)
+def test_an_arm_that_cannot_be_driven_says_why_and_what_to_do(
+    fake: FakeController, line: str, kind: type[StageError], says: str
+) -> None:
+    fake.tell(line)
+    with pytest.raises(kind, match=says) as caught:
+        UrStage(fake.url, load())
+    assert caught.value.remedy
+
+
+def test_a_refused_connection_is_told_at_once() -> None:
+    with pytest.raises(ArmUnreachableError, match=r"No UR controller answers at 127\.0\.0\.250"):
+        UrStage("ur://127.0.0.250", load())
+
+
+@pytest.mark.parametrize("url", ["ur://", "ur:///x", "127.0.0.1"])
+def test_a_url_without_an_address_is_refused(url: str) -> None:
+    with pytest.raises(InputError, match="names no arm"):
+        UrStage(url, load())
+
+
+def test_a_frozen_controller_is_noticed_and_told_once(fake: FakeController) -> None:
+    with connected(fake) as stage:
+        stage.move_to((0, 0, -80))
+        poll_until(stage, lambda: far_on_its_way(stage))
+        fake.freeze()
+        with pytest.raises(ArmFrozenError, match="has told nothing for"):
+            poll_until(stage, lambda: False)
+        # The robot must be stopped after that, in a loop that polls the stage too.
+        stage.poll(0)
+        assert not stage.moving
+        with pytest.raises(ArmFrozenError, match="can't be told to stop"):
+            stage.stop()
+        with pytest.raises(ArmFrozenError):
+            stage.move_to((0, 0, 0))
+
+
+def test_a_dead_controller_is_noticed(fake: FakeController) -> None:
+    with connected(fake) as stage:
+        stage.move_to((0, 0, -80))
+        poll_until(stage, lambda: far_on_its_way(stage))
+        fake.close()
+        with pytest.raises(StageError):
+            poll_until(stage, lambda: False)
+
+
+def test_a_protective_stop_in_mid_move_is_noticed(fake: FakeController) -> None:
+    with connected(fake) as stage:
+        stage.move_to((0, 0, -80))
+        poll_until(stage, lambda: far_on_its_way(stage))
+        fake.tell("safety 3")
+        with pytest.raises(ArmSafetyError, match="protective stop"):
+            poll_until(stage, lambda: False)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"), [("stop_program", "its program has ended"), ("slider 0", "speed slider")]
+)
+def test_an_arm_that_was_stopped_by_someone_says_so(
+    fake: FakeController, line: str, says: str
+) -> None:
+    with connected(fake) as stage:
+        stage.move_to((0, 0, -80))
+        poll_until(stage, lambda: far_on_its_way(stage))
+        fake.tell(line)
+        with pytest.raises(ArmStoppedError, match=says):
+            poll_until(stage, lambda: False)
+
+
+def test_the_controllers_watchdog_stops_the_arm_of_a_host_that_hangs(
+    fake: FakeController,
+) -> None:
+    with connected(fake, watchdog_hz=5.0) as stage:
+        stage.move_to((0, 0, -300), speed_mm_s=20)
+        poll_until(stage, lambda: far_on_its_way(stage))
+        # The host hangs: nobody polls, and after a fifth of a second the controller acts.
+        controller = stage._controller
+        end_s = time.monotonic() + TIMEOUT_S
+        while controller.program_runs():
+            assert time.monotonic() < end_s
+            time.sleep(0.005)
+        assert controller.state().speed_mm_s == 0
+        assert stage.position_mm[2] > -100
+
+
+def test_a_pause_of_the_host_at_rest_costs_nothing(fake: FakeController) -> None:
+    """A trajectory that was computed for long let the watchdog end the arm's program: the
+    next move was refused.
+    """
+    with connected(fake, watchdog_hz=5.0) as stage:
+        controller = stage._controller
+        end_s = time.monotonic() + TIMEOUT_S
+        while controller.program_runs():
+            assert time.monotonic() < end_s
+            time.sleep(0.005)
+        stage.move_to((0, 0, -5))
+        poll_until(stage, lambda: not stage.moving)
+        assert stage.position_mm == pytest.approx((0, 0, -5), abs=NEAR_MM)
+
+
+@pytest.mark.parametrize("position_mm", [(1, 2), (0, 0, math.nan)])
+def test_nonsense_is_refused(fake: FakeController, position_mm: tuple[float, ...]) -> None:
+    with connected(fake) as stage, pytest.raises(StageError, match="can't go to"):
+        stage.move_to(position_mm)
+
+
+angles = st.floats(-3, 3)
+
+
+@given(st.tuples(angles, angles, angles))
+def test_rotation_vectors_turn_about_themselves(vector_rad: tuple[float, float, float]) -> None:
+    turned = rotation(vector_rad)
+    assert turned @ turned.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(turned) == pytest.approx(1)
+    assert turned @ np.array(vector_rad) == pytest.approx(np.array(vector_rad), abs=1e-9)
+    angle_rad = math.hypot(*vector_rad)
+    assert np.trace(turned) == pytest.approx(1 + 2 * math.cos(angle_rad), abs=1e-9)
+
+
+@given(st.tuples(angles, angles, angles), st.tuples(angles, angles, angles))
+def test_the_world_and_the_base_frame_agree(
+    turn_rad: tuple[float, float, float], point_mm: tuple[float, float, float]
+) -> None:
+    world = WorldFrame.at((100.0, 200.0, 300.0, *turn_rad))
+    assert world.to_world_mm(world.to_base_mm(point_mm).tolist()) == pytest.approx(
+        point_mm, abs=1e-9
+    )
