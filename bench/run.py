@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # The oracle that judges explorations is the tests' own.
 sys.path.insert(0, str(ROOT))
 
-from bench import avr_figures, elf, kinematics, line, motion  # noqa: E402  # needs the path above
+from bench import arm, avr_figures, elf, kinematics, line, motion  # noqa: E402  # needs the path above
 from bench.figure import Figure  # noqa: E402
 from tests.system import oracle  # noqa: E402
 
@@ -250,6 +250,7 @@ FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     "firmware_size": firmware_size,
     **avr_figures.FIGURES,
     **line.FIGURES,
+    **arm.FIGURES,
     "random_obstacles": random_obstacles,
     "kinematics_speed": kinematics_speed,
     "motion_segments": motion_segments,

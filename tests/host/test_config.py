@@ -68,7 +68,7 @@ MISTAKES = [
         "tendon_radius_mm = 8",
         (
             "my.toml: 'tendon_radius_mm' stands outside of any section. Put it below one of: "
-            "[geometry], [spring], [servo], [motion], [bristle], [stage], [explore], [tube], "
+            "[geometry], [spring], [servo], [motion], [bristle], [stage], [ur], [explore], [tube], "
             "[simulator]."
         ),
     ),
