@@ -377,10 +377,25 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
 SETAE_EXPORT int setae_world_sensor_fault(setae_world* world, int fault) {
   if (!world->world)
     return fail(world, kWrongTime, kNotStarted);
-  if (fault < 0 || fault > 3) {
-    return fail(world, kBadArgument, "a sensor fault is 0 (none), 1, 2 or 3");
-  }
+  if (fault < 0 || fault >= setae::sim::kSensorFaults)
+    return fail(world, kBadArgument, "a sensor fault is 0 (none) to 7");
   world->world->set_sensor_fault(static_cast<setae::sim::SensorFault>(fault));
+  return 0;
+}
+
+SETAE_EXPORT int setae_world_supply(setae_world* world, int supply_mv) {
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
+  if (supply_mv < 0 || supply_mv > 6000)
+    return fail(world, kBadArgument, "supply_mv is 0 to 6000");
+  world->world->set_supply_mv(static_cast<uint16_t>(supply_mv));
+  return 0;
+}
+
+SETAE_EXPORT int setae_world_stop_switch(setae_world* world, int open) {
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
+  world->world->set_stop_switch(open != 0);
   return 0;
 }
 

@@ -98,9 +98,13 @@ int setae_world_arm_stop(setae_world*, double acceleration_mm_s2);
 
 int setae_world_truth(const setae_world*, setae_truth* out);
 
-/* Faults to inject, for tests: 0 none, 1 absent, 2 silent, 3 bus error. */
+/* Faults to inject, for tests: 0 none, 1 absent, 2 silent, 3 bus error, 4 another chip,
+ * 5 stuck, 6 out of range, 7 noisy. */
 int setae_world_sensor_fault(setae_world*, int fault);
-/* The reset button, or DTR: the board starts anew, retained memory survives. */
+/* The board's supply, 5000 until then, and its stop switch, 1 (open) until then. */
+int setae_world_supply(setae_world*, int supply_mv);
+int setae_world_stop_switch(setae_world*, int open);
+/* The reset button, or DTR: the board starts anew, retained memory and EEPROM survive. */
 int setae_world_reset_board(setae_world*);
 
 #ifdef __cplusplus

@@ -276,24 +276,42 @@ bool World::sample() {
 
   if (!board_)
     return false;
-  const uint64_t sampled_us = hal_.board_us();
+  push_sample();
+  return true;
+}
+
+void World::push_sample() {
+  constexpr double kNoiseHpa = 10;
+  protocol::Sensor status = protocol::Sensor::kOk;
+  double hpa = pressure_hpa();
   switch (sensor_fault_) {
-    case SensorFault::kNone:
-      hal_.push_sample(
-          protocol::Sensor::kOk,
-          static_cast<int32_t>(std::lround(protocol::kPressureLsbPerHpa * pressure_hpa())),
-          sampled_us);
-      break;
+    case SensorFault::kSilent:
+      return;
     case SensorFault::kAbsent:
-      hal_.push_sample(protocol::Sensor::kAbsent, 0, sampled_us);
+      status = protocol::Sensor::kAbsent;
       break;
     case SensorFault::kBus:
-      hal_.push_sample(protocol::Sensor::kBus, 0, sampled_us);
+      status = protocol::Sensor::kBus;
       break;
-    case SensorFault::kSilent:
+    case SensorFault::kWrong:
+      status = protocol::Sensor::kWrong;
+      break;
+    case SensorFault::kRange:
+      hpa = 0;
+      break;
+    case SensorFault::kNoisy:
+      hpa += samples_ % 2 ? kNoiseHpa : -kNoiseHpa;
+      break;
+    default:
       break;
   }
-  return true;
+  int32_t raw = static_cast<int32_t>(std::lround(protocol::kPressureLsbPerHpa * hpa));
+  // The part's own noise moves the last bits, whatever the pressure does.
+  if (raw == last_raw_)
+    raw ^= 1;
+  if (sensor_fault_ != SensorFault::kStuck)
+    last_raw_ = raw;
+  hal_.push_sample(status, last_raw_, hal_.board_us());
 }
 
 // Brings servos and spring to the present time, the spring from `duration_us` ago.

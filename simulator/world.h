@@ -24,7 +24,8 @@
 namespace setae {
 namespace sim {
 
-enum class SensorFault { kNone, kAbsent, kSilent, kBus };
+enum class SensorFault { kNone, kAbsent, kSilent, kBus, kWrong, kStuck, kRange, kNoisy };
+constexpr int kSensorFaults = 8;
 
 // All that moves; copied where the world must be looked at between two steps.
 struct Body {
@@ -87,6 +88,8 @@ class World {
   Outcome outcome() const;
 
   void set_sensor_fault(SensorFault fault) { sensor_fault_ = fault; }
+  void set_supply_mv(uint16_t supply_mv) { hal_.set_supply_mv(supply_mv); }
+  void set_stop_switch(bool open) { hal_.set_stop_switch(open); }
   void reset_board();
 
  private:
@@ -98,6 +101,7 @@ class World {
   bool receive();
   bool start_frame();
   bool sample();
+  void push_sample();
   void move(Body& body, int64_t duration_us) const;
   void transmit();
   void ask_foreign();
@@ -127,6 +131,7 @@ class World {
   Bristle bristle_;
   SensorFault sensor_fault_ = SensorFault::kNone;
   int64_t samples_ = 0;
+  int32_t last_raw_ = 0;
   int64_t last_sample_us_ = 0;
   int64_t next_sample_us_;
   int unsolved_ = 0;

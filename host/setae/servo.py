@@ -374,6 +374,7 @@ def board_limits(config: Config, *, margin_mm: float = 1.0) -> messages.SetLimit
             config.bristle.coarse_threshold_hpa * messages.PRESSURE_LSB_PER_HPA
         ),
         hold_timeout_s=config.motion.hold_timeout_s,
+        stop_switch=config.motion.stop_switch,
     )
 
 

@@ -50,13 +50,18 @@ TARE_SAMPLES: Final = 8
 """Pressure samples averaged into the baseline when a guard is armed."""
 SENSOR_SILENT_FRAMES: Final = 5
 """Servo frames without a fresh sample after which the sensor counts as silent."""
+SENSOR_STUCK_SAMPLES: Final = 16
+"""Samples that agree in every bit after which the sensor counts as stuck (the LPS33HW's own
+noise is about 30 LSB)."""
+STATUS_FRAMES: Final = 50
+"""Servo frames between two `status` messages."""
 PULSE_TICKS_ABSOLUTE_MIN: Final = 1000
 """Compiled-in lower bound of every pulse (500 us)."""
 PULSE_TICKS_ABSOLUTE_MAX: Final = 5000
 """Compiled-in upper bound of every pulse (2500 us)."""
 ATTACH_INTERVAL_FRAMES: Final = 5
 """Servo frames between attaching one servo and the next: one start-up current at a time."""
-SCHEMA_HASH: Final = 0xA3B40BE7
+SCHEMA_HASH: Final = 0x735AE189
 """CRC-32C of what host and board must agree on; compared in the handshake."""
 CRC_BYTES: Final = 4
 HOST_OVERHEAD_BYTES: Final = 9
@@ -193,9 +198,11 @@ class Fault(IntEnum):
     SENSOR_SILENT = 3
     SENSOR_BUS = 4
     SENSOR_RANGE = 5
-    WATCHDOG = 6
-    SUPPLY_LOW = 7
-    INTERNAL = 8
+    SENSOR_STUCK = 6
+    SENSOR_NOISY = 7
+    WATCHDOG = 8
+    SUPPLY_LOW = 9
+    INTERNAL = 10
 
     @property
     def doc(self) -> str:
@@ -221,6 +228,10 @@ _FAULT_DOC: Mapping[Fault, str] = MappingProxyType(
         Fault.SENSOR_RANGE: (
             "The pressure is outside 260 to 1260 hPa, which the sensor can't measure."
         ),
+        Fault.SENSOR_STUCK: "Samples arrive, but their value has not changed in a single bit.",
+        Fault.SENSOR_NOISY: (
+            "The pressure jumps up and down by more than 5 hPa from sample to sample."
+        ),
         Fault.WATCHDOG: "The firmware's loop stalled and the watchdog reset the board.",
         Fault.SUPPLY_LOW: "The board's supply fell below 3.8 V.",
         Fault.INTERNAL: "The firmware found its own state inconsistent.",
@@ -240,6 +251,10 @@ _FAULT_REMEDY: Mapping[Fault, str] = MappingProxyType(
             "Check the pull-ups and keep the cable shorter than 30 cm, away from the servo leads."
         ),
         Fault.SENSOR_RANGE: "Check that the silicone does not press on the sensor's port.",
+        Fault.SENSOR_STUCK: "Power the board off and on; if it comes back, replace the sensor.",
+        Fault.SENSOR_NOISY: (
+            "Look for a loose silicone bond or wire, and keep the cable away from the servo leads."
+        ),
         Fault.WATCHDOG: "Report it with the log; power the board off and on before the next run.",
         Fault.SUPPLY_LOW: (
             "Give the servos a supply of their own, 5 A or more, with a common ground."
@@ -272,6 +287,8 @@ class Refusal(IntEnum):
     TARE_NOISY = 14
     TARE_FAR = 15
     REFLEX_RUNNING = 16
+    SUPPLY_LOW = 17
+    STOP_SWITCH = 18
 
     @property
     def doc(self) -> str:
@@ -308,6 +325,8 @@ _REFUSAL_DOC: Mapping[Refusal, str] = MappingProxyType(
             "contact already."
         ),
         Refusal.REFLEX_RUNNING: "The reflex has not ended yet.",
+        Refusal.SUPPLY_LOW: "The board's supply is too low to write its EEPROM.",
+        Refusal.STOP_SWITCH: "The stop switch is open.",
     }
 )
 
@@ -331,6 +350,8 @@ _REFUSAL_REMEDY: Mapping[Refusal, str] = MappingProxyType(
         Refusal.TARE_NOISY: "Let the robot rest before a guarded move; check the silicone bond.",
         Refusal.TARE_FAR: "Retract first; armed in contact means blind.",
         Refusal.REFLEX_RUNNING: "Wait for it, then resume.",
+        Refusal.SUPPLY_LOW: "Give the servos a supply of their own, then store again.",
+        Refusal.STOP_SWITCH: "Close it, then call resume().",
     }
 )
 
@@ -370,6 +391,8 @@ class Sensor(IntEnum):
     SILENT = 3
     BUS = 4
     RANGE = 5
+    STUCK = 6
+    NOISY = 7
 
     @property
     def doc(self) -> str:
@@ -385,6 +408,8 @@ _SENSOR_DOC: Mapping[Sensor, str] = MappingProxyType(
         Sensor.SILENT: "It answers, but no fresh sample comes.",
         Sensor.BUS: "The bus failed in a transfer.",
         Sensor.RANGE: "The sample is outside the sensor's range.",
+        Sensor.STUCK: "Samples arrive, but their value never changes.",
+        Sensor.NOISY: "The samples jump up and down.",
     }
 )
 
@@ -406,6 +431,7 @@ class MessageType(IntEnum):
     GUARD = 0x15
     DISARM = 0x16
     SET_LIMITS = 0x17
+    STORE_LIMITS = 0x18
     HELLO_REPLY = 0x81
     RECEIPT = 0x82
     PONG = 0x83
@@ -414,6 +440,7 @@ class MessageType(IntEnum):
     FAULT = 0x86
     REFUSAL = 0x87
     LIMITS = 0x88
+    STATUS = 0x89
 
 
 _HOSTHEADER = struct.Struct("<3B")
@@ -678,7 +705,7 @@ _ACKNOWLEDGE = struct.Struct("<2B")
 
 @dataclass(frozen=True, slots=True)
 class Acknowledge:
-    """The host has a record; the board stops repeating it and may overwrite it.
+    """The host has a record; the board stops repeating it, and the next one may take its place.
 
     Attributes
     ----------
@@ -1158,7 +1185,7 @@ class Disarm:
         )
 
 
-_SETLIMITS = struct.Struct("<9H8hIH")
+_SETLIMITS = struct.Struct("<9H8hIHB")
 
 
 @dataclass(frozen=True, slots=True)
@@ -1187,11 +1214,14 @@ class SetLimits:
         Contact threshold of unguarded motion; 0 switches it off.
     hold_timeout_s
         Holding this long without a host relaxes; 0 never does.
+    stop_switch
+        1: a normally closed switch from D4 to ground stops the robot when it opens; 0: D4 is
+        not looked at.
     """
 
     TYPE: ClassVar[MessageType] = MessageType.SET_LIMITS
     RELIABLE: ClassVar[bool] = True
-    SIZE: ClassVar[int] = 40
+    SIZE: ClassVar[int] = 41
 
     pulse_min_ticks: Ticks
     pulse_max_ticks: Ticks
@@ -1202,6 +1232,7 @@ class SetLimits:
     pair_difference_max_ticks: tuple[int, int]
     coarse_threshold_raw: int
     hold_timeout_s: int
+    stop_switch: int
 
     def pack(self) -> bytes:
         """Return the bytes on the wire; ValueError where a field is out of range."""
@@ -1216,13 +1247,14 @@ class SetLimits:
                 *self.pair_difference_max_ticks,
                 self.coarse_threshold_raw,
                 self.hold_timeout_s,
+                self.stop_switch,
             )
         except (struct.error, IndexError, TypeError) as error:
             raise ValueError(f"SetLimits: {error}") from None
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """Read exactly 40 bytes; ValueError for anything else."""
+        """Read exactly 41 bytes; ValueError for anything else."""
         try:
             v = _SETLIMITS.unpack(data)
         except struct.error as error:
@@ -1237,6 +1269,49 @@ class SetLimits:
             v[15:17],
             v[17],
             v[18],
+            v[19],
+        )
+
+
+_STORELIMITS = struct.Struct("<B")
+
+
+@dataclass(frozen=True, slots=True)
+class StoreLimits:
+    """Write the limits in force to EEPROM, for the next start.
+
+    Only while relaxed; `status` tells when it is done.
+
+    Attributes
+    ----------
+    reserved
+        0.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.STORE_LIMITS
+    RELIABLE: ClassVar[bool] = True
+    SIZE: ClassVar[int] = 1
+
+    reserved: int
+
+    def pack(self) -> bytes:
+        """Return the bytes on the wire; ValueError where a field is out of range."""
+        try:
+            return _STORELIMITS.pack(
+                self.reserved,
+            )
+        except (struct.error, IndexError, TypeError) as error:
+            raise ValueError(f"StoreLimits: {error}") from None
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Self:
+        """Read exactly 1 bytes; ValueError for anything else."""
+        try:
+            v = _STORELIMITS.unpack(data)
+        except struct.error as error:
+            raise ValueError(f"StoreLimits: {error}") from None
+        return cls(
+            v[0],
         )
 
 
@@ -1633,7 +1708,7 @@ class Trip:
         )
 
 
-_FAULTMESSAGE = struct.Struct("<3B2I5H")
+_FAULTMESSAGE = struct.Struct("<4B2I5H")
 
 
 @dataclass(frozen=True, slots=True)
@@ -1646,6 +1721,8 @@ class FaultMessage:
         Raised with each fault; never 0.
     session
         The session in which it was latched; 0 where there was none.
+    further
+        Faults since then that this record kept from being latched, at most 255.
     fault
         What is broken.
     detail
@@ -1660,10 +1737,11 @@ class FaultMessage:
 
     TYPE: ClassVar[MessageType] = MessageType.FAULT
     RELIABLE: ClassVar[bool] = False
-    SIZE: ClassVar[int] = 21
+    SIZE: ClassVar[int] = 22
 
     record_id: int
     session: int
+    further: int
     fault: Fault
     detail: int
     frame: int
@@ -1676,6 +1754,7 @@ class FaultMessage:
             return _FAULTMESSAGE.pack(
                 self.record_id,
                 self.session,
+                self.further,
                 self.fault,
                 self.detail,
                 self.frame,
@@ -1687,7 +1766,7 @@ class FaultMessage:
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """Read exactly 21 bytes; ValueError for anything else."""
+        """Read exactly 22 bytes; ValueError for anything else."""
         try:
             v = _FAULTMESSAGE.unpack(data)
         except struct.error as error:
@@ -1695,11 +1774,12 @@ class FaultMessage:
         return cls(
             v[0],
             v[1],
-            Fault(v[2]),
-            v[3],
+            v[2],
+            Fault(v[3]),
             v[4],
             v[5],
-            v[6:10],
+            v[6],
+            v[7:11],
         )
 
 
@@ -1778,7 +1858,7 @@ class RefusalMessage:
         )
 
 
-_LIMITS = struct.Struct("<9H8hIH")
+_LIMITS = struct.Struct("<9H8hIHB")
 
 
 @dataclass(frozen=True, slots=True)
@@ -1805,11 +1885,14 @@ class Limits:
         Contact threshold of unguarded motion; 0 switches it off.
     hold_timeout_s
         Holding this long without a host relaxes; 0 never does.
+    stop_switch
+        1: a normally closed switch from D4 to ground stops the robot when it opens; 0: D4 is
+        not looked at.
     """
 
     TYPE: ClassVar[MessageType] = MessageType.LIMITS
     RELIABLE: ClassVar[bool] = False
-    SIZE: ClassVar[int] = 40
+    SIZE: ClassVar[int] = 41
 
     pulse_min_ticks: Ticks
     pulse_max_ticks: Ticks
@@ -1820,6 +1903,7 @@ class Limits:
     pair_difference_max_ticks: tuple[int, int]
     coarse_threshold_raw: int
     hold_timeout_s: int
+    stop_switch: int
 
     def pack(self) -> bytes:
         """Return the bytes on the wire; ValueError where a field is out of range."""
@@ -1834,13 +1918,14 @@ class Limits:
                 *self.pair_difference_max_ticks,
                 self.coarse_threshold_raw,
                 self.hold_timeout_s,
+                self.stop_switch,
             )
         except (struct.error, IndexError, TypeError) as error:
             raise ValueError(f"Limits: {error}") from None
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """Read exactly 40 bytes; ValueError for anything else."""
+        """Read exactly 41 bytes; ValueError for anything else."""
         try:
             v = _LIMITS.unpack(data)
         except struct.error as error:
@@ -1855,6 +1940,82 @@ class Limits:
             v[15:17],
             v[17],
             v[18],
+            v[19],
+        )
+
+
+_STATUS = struct.Struct("<HI6B")
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Once per STATUS_FRAMES, and when a write to EEPROM ends.
+
+    Attributes
+    ----------
+    supply_mv
+        The board's supply; 0 before it was measured.
+    stored_crc
+        CRC-32C of the limits in EEPROM, as a `limits` payload; 0 where there are none.
+    storing
+        1 while limits are being written.
+    stop_switch_open
+        1 if D4 is not connected to ground.
+    rx_framing_errors
+        Bytes without a stop bit since start, modulo 256.
+    rx_overruns
+        Bytes that the UART lost because its handler came too late, modulo 256.
+    rx_overflows
+        Bytes that the receive ring had no room for, modulo 256.
+    late_pulses
+        Pulse edges that were armed too late, modulo 256.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.STATUS
+    RELIABLE: ClassVar[bool] = False
+    SIZE: ClassVar[int] = 12
+
+    supply_mv: int
+    stored_crc: int
+    storing: int
+    stop_switch_open: int
+    rx_framing_errors: int
+    rx_overruns: int
+    rx_overflows: int
+    late_pulses: int
+
+    def pack(self) -> bytes:
+        """Return the bytes on the wire; ValueError where a field is out of range."""
+        try:
+            return _STATUS.pack(
+                self.supply_mv,
+                self.stored_crc,
+                self.storing,
+                self.stop_switch_open,
+                self.rx_framing_errors,
+                self.rx_overruns,
+                self.rx_overflows,
+                self.late_pulses,
+            )
+        except (struct.error, IndexError, TypeError) as error:
+            raise ValueError(f"Status: {error}") from None
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Self:
+        """Read exactly 12 bytes; ValueError for anything else."""
+        try:
+            v = _STATUS.unpack(data)
+        except struct.error as error:
+            raise ValueError(f"Status: {error}") from None
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
+            v[5],
+            v[6],
+            v[7],
         )
 
 
@@ -1873,12 +2034,13 @@ HostMessage: TypeAlias = (
     | GuardMessage
     | Disarm
     | SetLimits
+    | StoreLimits
 )
 """Any message from the host."""
 
 
 BoardMessage: TypeAlias = (
-    HelloReply | Receipt | Pong | Telemetry | Trip | FaultMessage | RefusalMessage | Limits
+    HelloReply | Receipt | Pong | Telemetry | Trip | FaultMessage | RefusalMessage | Limits | Status
 )
 """Any message from the board."""
 
@@ -1898,6 +2060,7 @@ HOST_MESSAGES: Mapping[int, type[HostMessage]] = MappingProxyType(
         MessageType.GUARD: GuardMessage,
         MessageType.DISARM: Disarm,
         MessageType.SET_LIMITS: SetLimits,
+        MessageType.STORE_LIMITS: StoreLimits,
     }
 )
 """Message number to class, host side."""
@@ -1912,6 +2075,7 @@ BOARD_MESSAGES: Mapping[int, type[BoardMessage]] = MappingProxyType(
         MessageType.FAULT: FaultMessage,
         MessageType.REFUSAL: RefusalMessage,
         MessageType.LIMITS: Limits,
+        MessageType.STATUS: Status,
     }
 )
 """Message number to class, board side."""

@@ -55,6 +55,8 @@ CONSTANTS = (
     Constant("RECORD_REPEAT_FRAMES", 5, "Servo frames between repeats of an unacknowledged record."),
     Constant("TARE_SAMPLES", 8, "Pressure samples averaged into the baseline when a guard is armed."),
     Constant("SENSOR_SILENT_FRAMES", 5, "Servo frames without a fresh sample after which the sensor counts as silent."),
+    Constant("SENSOR_STUCK_SAMPLES", 16, "Samples that agree in every bit after which the sensor counts as stuck (the LPS33HW's own noise is about 30 LSB)."),
+    Constant("STATUS_FRAMES", 50, "Servo frames between two `status` messages."),
     Constant("PULSE_TICKS_ABSOLUTE_MIN", 1000, "Compiled-in lower bound of every pulse (500 us)."),
     Constant("PULSE_TICKS_ABSOLUTE_MAX", 5000, "Compiled-in upper bound of every pulse (2500 us)."),
     Constant("ATTACH_INTERVAL_FRAMES", 5, "Servo frames between attaching one servo and the next: one start-up current at a time."),
@@ -165,17 +167,27 @@ FAULT = Codes(
             "Check that the silicone does not press on the sensor's port.",
         ),
         Code(
-            "watchdog", 6,
+            "sensor_stuck", 6,
+            "Samples arrive, but their value has not changed in a single bit.",
+            "Power the board off and on; if it comes back, replace the sensor.",
+        ),
+        Code(
+            "sensor_noisy", 7,
+            "The pressure jumps up and down by more than 5 hPa from sample to sample.",
+            "Look for a loose silicone bond or wire, and keep the cable away from the servo leads.",
+        ),
+        Code(
+            "watchdog", 8,
             "The firmware's loop stalled and the watchdog reset the board.",
             "Report it with the log; power the board off and on before the next run.",
         ),
         Code(
-            "supply_low", 7,
+            "supply_low", 9,
             "The board's supply fell below 3.8 V.",
             "Give the servos a supply of their own, 5 A or more, with a common ground.",
         ),
         Code(
-            "internal", 8,
+            "internal", 10,
             "The firmware found its own state inconsistent.",
             "Report it with the log; power the board off and on before the next run.",
         ),
@@ -203,6 +215,8 @@ REFUSAL = Codes(
         Code("tare_noisy", 14, "The pressure was not steady while the baseline was taken.", "Let the robot rest before a guarded move; check the silicone bond."),
         Code("tare_far", 15, "The pressure at arming was far from its rest value: the bristle seems to be in contact already.", "Retract first; armed in contact means blind."),
         Code("reflex_running", 16, "The reflex has not ended yet.", "Wait for it, then resume."),
+        Code("supply_low", 17, "The board's supply is too low to write its EEPROM.", "Give the servos a supply of their own, then store again."),
+        Code("stop_switch", 18, "The stop switch is open.", "Close it, then call resume()."),
     ),
 )
 
@@ -228,6 +242,8 @@ SENSOR = Codes(
         Code("silent", 3, "It answers, but no fresh sample comes."),
         Code("bus", 4, "The bus failed in a transfer."),
         Code("range", 5, "The sample is outside the sensor's range."),
+        Code("stuck", 6, "Samples arrive, but their value never changes."),
+        Code("noisy", 7, "The samples jump up and down."),
     ),
 )
 
@@ -287,6 +303,19 @@ SAMPLE = Struct(
     "age_us" / Int16ul * "Age of the sample at the telemetry's own time.",
 )
 
+LIMITS = Struct(
+    "pulse_min_ticks" / Array(4, Int16ul) * "Lowest pulse of each servo.",
+    "pulse_max_ticks" / Array(4, Int16ul) * "Highest pulse of each servo.",
+    "slew_ticks" / Int16ul * "Fastest change of any pulse, ticks per servo frame.",
+    "pair_sum_min_ticks" / Array(2, Int16sl) * "For pairs (0, 2), (1, 3): lowest p_a + p_b.",
+    "pair_sum_max_ticks" / Array(2, Int16sl) * "Highest p_a + p_b.",
+    "pair_difference_min_ticks" / Array(2, Int16sl) * "Lowest p_a - p_b.",
+    "pair_difference_max_ticks" / Array(2, Int16sl) * "Highest p_a - p_b.",
+    "coarse_threshold_raw" / Int32ul * "Contact threshold of unguarded motion; 0 switches it off.",
+    "hold_timeout_s" / Int16ul * "Holding this long without a host relaxes; 0 never does.",
+    "stop_switch" / Int8ul * "1: a normally closed switch from D4 to ground stops the robot when it opens; 0: D4 is not looked at.",
+)
+
 HOST_MESSAGES = (
     Message(
         "hello", 0x01,
@@ -315,7 +344,7 @@ HOST_MESSAGES = (
             "record" / Int8ul * "Which latch.",
             "record_id" / Int8ul * "The record's id; another id changes nothing.",
         ),
-        "The host has a record; the board stops repeating it and may overwrite it.",
+        "The host has a record; the board stops repeating it, and the next one may take its place.",
         codes=(("record", "Record"),),
     ),
     Message(
@@ -387,18 +416,14 @@ HOST_MESSAGES = (
     ),
     Message(
         "set_limits", 0x17,
-        Struct(
-            "pulse_min_ticks" / Array(4, Int16ul) * "Lowest pulse of each servo.",
-            "pulse_max_ticks" / Array(4, Int16ul) * "Highest pulse of each servo.",
-            "slew_ticks" / Int16ul * "Fastest change of any pulse, ticks per servo frame.",
-            "pair_sum_min_ticks" / Array(2, Int16sl) * "For pairs (0, 2), (1, 3): lowest p_a + p_b.",
-            "pair_sum_max_ticks" / Array(2, Int16sl) * "Highest p_a + p_b.",
-            "pair_difference_min_ticks" / Array(2, Int16sl) * "Lowest p_a - p_b.",
-            "pair_difference_max_ticks" / Array(2, Int16sl) * "Highest p_a - p_b.",
-            "coarse_threshold_raw" / Int32ul * "Contact threshold of unguarded motion; 0 switches it off.",
-            "hold_timeout_s" / Int16ul * "Holding this long without a host relaxes; 0 never does.",
-        ),
+        LIMITS,
         "Set the limits. Only while relaxed; inside the compiled-in bounds.",
+        reliable=True,
+    ),
+    Message(
+        "store_limits", 0x18,
+        Struct("reserved" / Int8ul * "0."),
+        "Write the limits in force to EEPROM, for the next start. Only while relaxed; `status` tells when it is done.",
         reliable=True,
     ),
 )
@@ -479,6 +504,7 @@ BOARD_MESSAGES = (
         Struct(
             "record_id" / Int8ul * "Raised with each fault; never 0.",
             "session" / Int8ul * "The session in which it was latched; 0 where there was none.",
+            "further" / Int8ul * "Faults since then that this record kept from being latched, at most 255.",
             "fault" / Int8ul * "What is broken.",
             "detail" / Int32ul * "A figure that depends on the fault.",
             "frame" / Int32ul * "Board time of the fault.",
@@ -505,8 +531,22 @@ BOARD_MESSAGES = (
     ),
     Message(
         "limits", 0x88,
-        HOST_MESSAGES[-1].payload,
+        LIMITS,
         "Answer to read_limits: the limits in force.",
+    ),
+    Message(
+        "status", 0x89,
+        Struct(
+            "supply_mv" / Int16ul * "The board's supply; 0 before it was measured.",
+            "stored_crc" / Int32ul * "CRC-32C of the limits in EEPROM, as a `limits` payload; 0 where there are none.",
+            "storing" / Int8ul * "1 while limits are being written.",
+            "stop_switch_open" / Int8ul * "1 if D4 is not connected to ground.",
+            "rx_framing_errors" / Int8ul * "Bytes without a stop bit since start, modulo 256.",
+            "rx_overruns" / Int8ul * "Bytes that the UART lost because its handler came too late, modulo 256.",
+            "rx_overflows" / Int8ul * "Bytes that the receive ring had no room for, modulo 256.",
+            "late_pulses" / Int8ul * "Pulse edges that were armed too late, modulo 256.",
+        ),
+        "Once per STATUS_FRAMES, and when a write to EEPROM ends.",
     ),
 )
 

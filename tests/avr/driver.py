@@ -52,6 +52,7 @@ WIDE_LIMITS = SetLimits(
     pair_difference_max_ticks=(4000, 4000),
     coarse_threshold_raw=0,
     hold_timeout_s=0,
+    stop_switch=0,
 )
 # So much is on a loaded line ahead of whatever the host sends.
 _BACKLOG_CYCLES = 8_000 * CYCLES_PER_US

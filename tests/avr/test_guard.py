@@ -39,8 +39,8 @@ def test_a_contact_freezes_the_next_frame_and_its_record_arrives(driver: Driver)
 
         record = driver.trips[-1].record
         assert record.cause is TripCause.CONTACT
-        assert record.pressure_raw == round(TOUCH_HPA * PRESSURE_LSB_PER_HPA)
-        assert record.baseline_raw == round(REST_HPA * PRESSURE_LSB_PER_HPA)
+        assert abs(record.pressure_raw - round(TOUCH_HPA * PRESSURE_LSB_PER_HPA)) <= 1
+        assert abs(record.baseline_raw - round(REST_HPA * PRESSURE_LSB_PER_HPA)) <= 1
 
         frames = driver.frames()
         frozen = frames[-1].ticks

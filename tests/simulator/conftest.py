@@ -42,6 +42,7 @@ _WIDE = SetLimits(
     pair_difference_max_ticks=(4000, 4000),
     coarse_threshold_raw=0,
     hold_timeout_s=0,
+    stop_switch=0,
 )
 _EMPTY = Segment(duration_frames=0, target_ticks=(0, 0, 0, 0))
 

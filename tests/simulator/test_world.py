@@ -130,6 +130,10 @@ def test_reset_loses_the_session_and_keeps_the_pose(driver: Driver) -> None:
         (SensorFault.ABSENT, Sensor.ABSENT),
         (SensorFault.BUS, Sensor.BUS),
         (SensorFault.SILENT, Sensor.SILENT),
+        (SensorFault.WRONG, Sensor.WRONG),
+        (SensorFault.STUCK, Sensor.STUCK),
+        (SensorFault.RANGE, Sensor.RANGE),
+        (SensorFault.NOISY, Sensor.NOISY),
     ],
 )
 def test_a_broken_sensor_is_seen_by_the_board(
@@ -140,7 +144,7 @@ def test_a_broken_sensor_is_seen_by_the_board(
     assert driver.session.telemetry is not None
     assert driver.session.telemetry.sensor == shown
     driver.world.sensor_fault(SensorFault.NONE)
-    driver.wait(0.5)
+    driver.wait(0.6)
     assert driver.session.telemetry.sensor == Sensor.OK
 
 

@@ -121,6 +121,8 @@ class Motion(Section):
         of a tendon, besides the rounding to ticks.
     hold_timeout_s
         Holding this long without a host relaxes the robot; 0 never does.
+    stop_switch
+        1 where a normally closed switch from D4 to ground stops the robot when it opens.
     """
 
     model: str = key(low=0, high=0, choices=TENDON_MODELS)
@@ -133,6 +135,7 @@ class Motion(Section):
     jerk_mm_s3: float = key(low=1, high=1e9)
     tolerance_um: float = key(low=0, high=1e4)
     hold_timeout_s: int = key(low=0, high=65535, integer=True)
+    stop_switch: int = key(low=0, high=1, choices=(0, 1))
 
     def _contradiction(self) -> str:
         for name in ("move_speed_mm_s", "retract_speed_mm_s", "relax_speed_mm_s"):

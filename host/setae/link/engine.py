@@ -26,6 +26,7 @@ from setae.link.events import (
     Opened,
     Refused,
     StateChanged,
+    StatusReceived,
     TelemetryReceived,
     Ticket,
     TicketState,
@@ -53,6 +54,7 @@ from setae_protocol.messages import (
     RefusalMessage,
     Segments,
     State,
+    Status,
     Stop,
     Telemetry,
     Trip,
@@ -295,6 +297,8 @@ class Engine:
             self._on_pong(message, now_us)
         elif isinstance(message, Limits):
             self._events.append(LimitsRead(message))
+        elif isinstance(message, Status) and fresh:
+            self._events.append(StatusReceived(message, now_us))
 
     def _on_telemetry(self, message: Telemetry, now_us: int) -> None:
         self.telemetry = message

@@ -14,6 +14,7 @@ from setae_protocol.messages import (
     Limits,
     RefusalMessage,
     State,
+    Status,
     Telemetry,
     Trip,
 )
@@ -26,6 +27,7 @@ __all__ = [
     "Opened",
     "Refused",
     "StateChanged",
+    "StatusReceived",
     "TelemetryReceived",
     "Ticket",
     "TicketState",
@@ -163,6 +165,14 @@ class LimitsRead:
 
 
 @dataclass(frozen=True, slots=True)
+class StatusReceived:
+    """Supply, EEPROM, stop switch and counters, as the board tells them once a second."""
+
+    status: Status
+    time_us: int
+
+
+@dataclass(frozen=True, slots=True)
 class LinkFailed:
     """The session is over; nothing is sent any more."""
 
@@ -177,6 +187,7 @@ Event: TypeAlias = (
     | FaultReported
     | Refused
     | LimitsRead
+    | StatusReceived
     | LinkFailed
 )
 """Whatever the link has to tell."""

@@ -17,6 +17,7 @@ from setae.link.verdicts import Verdicts
 from setae_protocol.messages import (
     WINDOW_FRAMES,
     BoardHeader,
+    Enable,
     GuardMessage,
     Resume,
     Segments,
@@ -128,7 +129,7 @@ class ReliableSender:
 
     def _transmit(self, item: _InFlight) -> None:
         message = item.ticket.message
-        if isinstance(message, (Resume, GuardMessage)):
+        if isinstance(message, (Enable, Resume)):
             # The board refuses them while a record waits to be acknowledged.
             self._records.acknowledge_again()
         self._outbox.put(message, sequence=item.sequence)

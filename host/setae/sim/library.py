@@ -162,6 +162,8 @@ def load() -> ctypes.CDLL:
         "arm_stop": (status, (world, c_double)),
         "truth": (status, (world, POINTER(CTruth))),
         "sensor_fault": (status, (world, c_int)),
+        "supply": (status, (world, c_int)),
+        "stop_switch": (status, (world, c_int)),
         "reset_board": (status, (world,)),
     }
     for name, (result, arguments) in signatures.items():

@@ -32,6 +32,10 @@ class SensorFault(IntEnum):
     ABSENT = 1
     SILENT = 2
     BUS = 3
+    WRONG = 4
+    STUCK = 5
+    RANGE = 6
+    NOISY = 7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -337,8 +341,16 @@ class World:
         """Break the pressure sensor, or mend it."""
         self._change(self._library.setae_world_sensor_fault(self._live, int(fault)))
 
+    def supply(self, supply_mv: int) -> None:
+        """Set the board's supply, 5000 mV at the start."""
+        self._change(self._library.setae_world_supply(self._live, supply_mv))
+
+    def stop_switch(self, *, is_open: bool) -> None:
+        """Open or close the stop switch on D4; at the start there is none, which is open."""
+        self._change(self._library.setae_world_stop_switch(self._live, int(is_open)))
+
     def reset_board(self) -> None:
-        """Press the reset button: the board starts anew, its retained memory survives."""
+        """Press the reset button: the board starts anew; retained memory and EEPROM survive."""
         self._change(self._library.setae_world_reset_board(self._live))
 
     def close(self) -> None:

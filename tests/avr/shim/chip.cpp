@@ -47,6 +47,7 @@ Chip::Chip(const std::string& elf_path) : avr_(avr_make_mcu_by_name("atmega328p"
   avr_init(avr_);
   avr_->log = LOG_ERROR;
   firmware.frequency = kClockHz;
+  firmware.vcc = firmware.avcc = 5000;  // mV; the ADC's reference
   avr_load_firmware(avr_, &firmware);
   avr_->frequency = kClockHz;
   avr_->codeend = avr_->flashend;

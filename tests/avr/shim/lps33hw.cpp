@@ -146,12 +146,14 @@ void Lps33hw::sample(Cycle when) {
   }
   if (silent_)
     return;
-  samples_.push_back({when, raw_});
+  // The part's noise is many times the last bit, so that no value stays for long.
+  const int32_t raw = raw_ ^ (samples_.size() % 8 == 7);
+  samples_.push_back({when, raw});
   if (locked_) {  // BDU: not updated until both parts have been read
     held_back_ = true;
-    held_raw_ = raw_;
+    held_raw_ = raw;
   } else {
-    show(raw_);
+    show(raw);
   }
 }
 

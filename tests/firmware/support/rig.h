@@ -39,7 +39,8 @@ class Rig {
       const uint64_t next_us = hal.board_us() + kStepUs;
       if (sensor == protocol::Sensor::kOk) {
         if (next_us >= sample_due_us_) {
-          hal.push_sample(sensor, pressure_raw, next_us);
+          // A sensor's value is never the same for long.
+          hal.push_sample(sensor, pressure_raw ^ (++samples_ % 8 == 0), next_us);
           sample_due_us_ = next_us + kSampleUs;
         }
       } else {
@@ -68,6 +69,10 @@ class Rig {
     sample_due_us_ = 0;
     outputs.clear();
     run_frames(2);
+  }
+  void power_cycle() {
+    hal.forget_retained();
+    restart(protocol::ResetCause::kPowerOn);
   }
 
   // ---- the host's end ----
@@ -209,6 +214,7 @@ class Rig {
   std::vector<Heard<protocol::FaultMessage>> faults;
   std::vector<Heard<protocol::RefusalMessage>> refusals;
   std::vector<Heard<protocol::Limits>> limits;
+  std::vector<Heard<protocol::Status>> statuses;
   uint32_t malformed = 0;
 
  private:
@@ -243,6 +249,8 @@ class Rig {
         return keep(refusals);
       case protocol::MessageType::kLimits:
         return keep(limits);
+      case protocol::MessageType::kStatus:
+        return keep(statuses);
       default:
         ++malformed;
     }
@@ -250,6 +258,7 @@ class Rig {
 
   protocol::FrameDecoder decoder_;
   uint64_t sample_due_us_ = 0;
+  uint32_t samples_ = 0;
 };
 
 }  // namespace setae

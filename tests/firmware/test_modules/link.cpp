@@ -36,8 +36,20 @@ TEST_CASE("a session remembers the one before, and starts at 0") {
   CHECK(session.expected() == 0);
 }
 
+namespace {
+
+struct FaultLatch : Latch<protocol::FaultMessage> {
+  FaultLatch() {
+    memory.clear();
+    begin(memory);
+  }
+  Memory memory;
+};
+
+}  // namespace
+
 TEST_CASE("a record is repeated until its own id is acknowledged, and can be recalled ever after") {
-  Latch<protocol::FaultMessage> latch;
+  FaultLatch latch;
   latch.recall();
   CHECK_FALSE(latch.wanted(true));  // there is nothing yet
   latch.set({}, 9);
@@ -67,7 +79,7 @@ TEST_CASE("a record is repeated until its own id is acknowledged, and can be rec
 }
 
 TEST_CASE("record ids skip 0 when they wrap") {
-  Latch<protocol::FaultMessage> latch;
+  FaultLatch latch;
   for (int i = 0; i < 255; ++i)
     latch.set({}, 9);
   CHECK(latch.record().record_id == 255);

@@ -1098,13 +1098,13 @@ const uint8_t frame_52_header[] = {
 const uint8_t frame_52_payload[] = {
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
     0x00, 0x00, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80,
-    0x00, 0x80, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
+    0x00, 0x80, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
 const uint8_t frame_52_wire[] = {
     0x02, 0x17, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x02, 0x80,
-    0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x01, 0x01, 0x01, 0x01, 0x01, 0x05, 0xed, 0xe6, 0xe7, 0x8c,
-    0x00
+    0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x05, 0x7e, 0x50, 0xe9,
+    0x0e, 0x00
 };
 inline bool frame_52_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::HostHeader head{};
@@ -1119,7 +1119,8 @@ inline bool frame_52_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pair_sum_max_ticks[0] == -32768 && message.pair_sum_max_ticks[1] == -32768 &&
   message.pair_difference_min_ticks[0] == -32768 && message.pair_difference_min_ticks[1] == -32768
   && message.pair_difference_max_ticks[0] == -32768 && message.pair_difference_max_ticks[1] ==
-  -32768 && message.coarse_threshold_raw == 0 && message.hold_timeout_s == 0;
+  -32768 && message.coarse_threshold_raw == 0 && message.hold_timeout_s == 0 && message.stop_switch
+  == 0;
 }
 // set_limits_highest
 const uint8_t frame_53_header[] = {
@@ -1128,13 +1129,13 @@ const uint8_t frame_53_header[] = {
 const uint8_t frame_53_payload[] = {
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f,
-    0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff
+    0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff
 };
 const uint8_t frame_53_wire[] = {
-    0x30, 0x17, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
+    0x31, 0x17, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f,
-    0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x62, 0x9b, 0xaa, 0xdd,
-    0x00
+    0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x0e, 0x49, 0x20,
+    0x7f, 0x00
 };
 inline bool frame_53_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::HostHeader head{};
@@ -1151,7 +1152,7 @@ inline bool frame_53_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pair_sum_max_ticks[1] == 32767 && message.pair_difference_min_ticks[0] == 32767 &&
   message.pair_difference_min_ticks[1] == 32767 && message.pair_difference_max_ticks[0] == 32767 &&
   message.pair_difference_max_ticks[1] == 32767 && message.coarse_threshold_raw == 4294967295u &&
-  message.hold_timeout_s == 65535u;
+  message.hold_timeout_s == 65535u && message.stop_switch == 255;
 }
 // set_limits_random_1
 const uint8_t frame_54_header[] = {
@@ -1160,13 +1161,13 @@ const uint8_t frame_54_header[] = {
 const uint8_t frame_54_payload[] = {
     0x45, 0xa9, 0x00, 0x87, 0xa6, 0xf3, 0x5a, 0xae, 0x21, 0x8c, 0x1a, 0x65, 0x72, 0xfd, 0x57, 0x6b,
     0x9d, 0x46, 0x38, 0xcc, 0x67, 0x1b, 0x34, 0x9b, 0xdc, 0xed, 0x6d, 0x78, 0x02, 0xc8, 0xa7, 0x30,
-    0x6e, 0x36, 0xa5, 0xbb, 0xd2, 0xe9, 0x1c, 0x16
+    0x6e, 0x36, 0xa5, 0xbb, 0xd2, 0xe9, 0x1c, 0x16, 0xcb
 };
 const uint8_t frame_54_wire[] = {
-    0x06, 0x17, 0xf0, 0x60, 0x45, 0xa9, 0x2a, 0x87, 0xa6, 0xf3, 0x5a, 0xae, 0x21, 0x8c, 0x1a, 0x65,
+    0x06, 0x17, 0xf0, 0x60, 0x45, 0xa9, 0x2b, 0x87, 0xa6, 0xf3, 0x5a, 0xae, 0x21, 0x8c, 0x1a, 0x65,
     0x72, 0xfd, 0x57, 0x6b, 0x9d, 0x46, 0x38, 0xcc, 0x67, 0x1b, 0x34, 0x9b, 0xdc, 0xed, 0x6d, 0x78,
-    0x02, 0xc8, 0xa7, 0x30, 0x6e, 0x36, 0xa5, 0xbb, 0xd2, 0xe9, 0x1c, 0x16, 0x05, 0x49, 0xb2, 0xb9,
-    0x00
+    0x02, 0xc8, 0xa7, 0x30, 0x6e, 0x36, 0xa5, 0xbb, 0xd2, 0xe9, 0x1c, 0x16, 0xcb, 0xfb, 0x78, 0x31,
+    0x3d, 0x00
 };
 inline bool frame_54_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::HostHeader head{};
@@ -1182,7 +1183,8 @@ inline bool frame_54_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pair_sum_max_ticks[0] == -25804 && message.pair_sum_max_ticks[1] == -4644 &&
   message.pair_difference_min_ticks[0] == 30829 && message.pair_difference_min_ticks[1] == -14334
   && message.pair_difference_max_ticks[0] == 12455 && message.pair_difference_max_ticks[1] == 13934
-  && message.coarse_threshold_raw == 3922901925u && message.hold_timeout_s == 5660;
+  && message.coarse_threshold_raw == 3922901925u && message.hold_timeout_s == 5660 &&
+  message.stop_switch == 203;
 }
 // set_limits_random_2
 const uint8_t frame_55_header[] = {
@@ -1191,13 +1193,13 @@ const uint8_t frame_55_header[] = {
 const uint8_t frame_55_payload[] = {
     0x76, 0xe8, 0xa9, 0x2e, 0x42, 0x14, 0x68, 0x38, 0x62, 0x78, 0x4e, 0x7e, 0x36, 0x8b, 0xff, 0x19,
     0x3f, 0x18, 0x32, 0x29, 0xbb, 0xd2, 0x30, 0x01, 0x9d, 0x9a, 0xbb, 0x2c, 0xed, 0xb3, 0xeb, 0xdd,
-    0x23, 0x4a, 0x29, 0x9f, 0xf5, 0xa6, 0xce, 0x99
+    0x23, 0x4a, 0x29, 0x9f, 0xf5, 0xa6, 0xce, 0x99, 0x55
 };
 const uint8_t frame_55_wire[] = {
-    0x30, 0x17, 0xde, 0x91, 0x76, 0xe8, 0xa9, 0x2e, 0x42, 0x14, 0x68, 0x38, 0x62, 0x78, 0x4e, 0x7e,
+    0x31, 0x17, 0xde, 0x91, 0x76, 0xe8, 0xa9, 0x2e, 0x42, 0x14, 0x68, 0x38, 0x62, 0x78, 0x4e, 0x7e,
     0x36, 0x8b, 0xff, 0x19, 0x3f, 0x18, 0x32, 0x29, 0xbb, 0xd2, 0x30, 0x01, 0x9d, 0x9a, 0xbb, 0x2c,
-    0xed, 0xb3, 0xeb, 0xdd, 0x23, 0x4a, 0x29, 0x9f, 0xf5, 0xa6, 0xce, 0x99, 0xef, 0x92, 0x13, 0xb0,
-    0x00
+    0xed, 0xb3, 0xeb, 0xdd, 0x23, 0x4a, 0x29, 0x9f, 0xf5, 0xa6, 0xce, 0x99, 0x55, 0x32, 0x1a, 0x3a,
+    0x8b, 0x00
 };
 inline bool frame_55_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::HostHeader head{};
@@ -1213,22 +1215,91 @@ inline bool frame_55_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pair_sum_max_ticks[0] == 304 && message.pair_sum_max_ticks[1] == -25955 &&
   message.pair_difference_min_ticks[0] == 11451 && message.pair_difference_min_ticks[1] == -19475
   && message.pair_difference_max_ticks[0] == -8725 && message.pair_difference_max_ticks[1] == 18979
-  && message.coarse_threshold_raw == 2801114921u && message.hold_timeout_s == 39374u;
+  && message.coarse_threshold_raw == 2801114921u && message.hold_timeout_s == 39374u &&
+  message.stop_switch == 85;
 }
-// hello_reply_lowest
+// store_limits_lowest
 const uint8_t frame_56_header[] = {
-    0x81, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
+    0x18, 0x00, 0x00
 };
 const uint8_t frame_56_payload[] = {
+    0x00
+};
+const uint8_t frame_56_wire[] = {
+    0x02, 0x18, 0x01, 0x01, 0x05, 0x1c, 0x99, 0x47, 0x57, 0x00
+};
+inline bool frame_56_fields_match(const uint8_t* header, const uint8_t* payload) {
+  protocol::HostHeader head{};
+  protocol::StoreLimits message{};
+  decode(header, head);
+  decode(payload, message);
+  return head.type == 24 && head.session == 0 && head.sequence == 0 && message.reserved == 0;
+}
+// store_limits_highest
+const uint8_t frame_57_header[] = {
+    0x18, 0xff, 0xff
+};
+const uint8_t frame_57_payload[] = {
+    0xff
+};
+const uint8_t frame_57_wire[] = {
+    0x09, 0x18, 0xff, 0xff, 0xff, 0x66, 0xc5, 0xdc, 0xc8, 0x00
+};
+inline bool frame_57_fields_match(const uint8_t* header, const uint8_t* payload) {
+  protocol::HostHeader head{};
+  protocol::StoreLimits message{};
+  decode(header, head);
+  decode(payload, message);
+  return head.type == 24 && head.session == 255 && head.sequence == 255 && message.reserved == 255;
+}
+// store_limits_random_1
+const uint8_t frame_58_header[] = {
+    0x18, 0x37, 0x0d
+};
+const uint8_t frame_58_payload[] = {
+    0x11
+};
+const uint8_t frame_58_wire[] = {
+    0x09, 0x18, 0x37, 0x0d, 0x11, 0x94, 0x05, 0x58, 0x90, 0x00
+};
+inline bool frame_58_fields_match(const uint8_t* header, const uint8_t* payload) {
+  protocol::HostHeader head{};
+  protocol::StoreLimits message{};
+  decode(header, head);
+  decode(payload, message);
+  return head.type == 24 && head.session == 55 && head.sequence == 13 && message.reserved == 17;
+}
+// store_limits_random_2
+const uint8_t frame_59_header[] = {
+    0x18, 0x51, 0xc7
+};
+const uint8_t frame_59_payload[] = {
+    0xdb
+};
+const uint8_t frame_59_wire[] = {
+    0x09, 0x18, 0x51, 0xc7, 0xdb, 0x19, 0x49, 0x22, 0x71, 0x00
+};
+inline bool frame_59_fields_match(const uint8_t* header, const uint8_t* payload) {
+  protocol::HostHeader head{};
+  protocol::StoreLimits message{};
+  decode(header, head);
+  decode(payload, message);
+  return head.type == 24 && head.session == 81 && head.sequence == 199 && message.reserved == 219;
+}
+// hello_reply_lowest
+const uint8_t frame_60_header[] = {
+    0x81, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
+};
+const uint8_t frame_60_payload[] = {
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_56_wire[] = {
+const uint8_t frame_60_wire[] = {
     0x02, 0x81, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x01, 0x01, 0x01, 0x05, 0x07, 0xed, 0xff, 0x5b, 0x00
 };
-inline bool frame_56_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_60_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::HelloReply message{};
   decode(header, head);
@@ -1242,19 +1313,19 @@ inline bool frame_56_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pulse_ticks[3] == 0 && message.sensor == 0;
 }
 // hello_reply_highest
-const uint8_t frame_57_header[] = {
+const uint8_t frame_61_header[] = {
     0x81, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
 };
-const uint8_t frame_57_payload[] = {
+const uint8_t frame_61_payload[] = {
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x04, 0xff,
-    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x05
+    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x07
 };
-const uint8_t frame_57_wire[] = {
+const uint8_t frame_61_wire[] = {
     0x29, 0x81, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x04, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
-    0xff, 0xff, 0xff, 0xff, 0x05, 0x63, 0x78, 0x73, 0x36, 0x00
+    0xff, 0xff, 0xff, 0xff, 0x07, 0x94, 0x08, 0x48, 0xd7, 0x00
 };
-inline bool frame_57_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_61_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::HelloReply message{};
   decode(header, head);
@@ -1266,22 +1337,22 @@ inline bool frame_57_fields_match(const uint8_t* header, const uint8_t* payload)
   message.previous_session == 255 && message.reset_cause == 4 && message.limits_crc == 4294967295u
   && message.pose_known == 255 && message.pulse_ticks[0] == 65535u && message.pulse_ticks[1] ==
   65535u && message.pulse_ticks[2] == 65535u && message.pulse_ticks[3] == 65535u && message.sensor
-  == 5;
+  == 7;
 }
 // hello_reply_random_1
-const uint8_t frame_58_header[] = {
+const uint8_t frame_62_header[] = {
     0x81, 0x5c, 0x4c, 0x53, 0x8f, 0x4c, 0x02
 };
-const uint8_t frame_58_payload[] = {
+const uint8_t frame_62_payload[] = {
     0xcc, 0xff, 0x83, 0x8d, 0x0e, 0x22, 0x14, 0x2c, 0xd6, 0x84, 0x89, 0x37, 0x6e, 0x90, 0x03, 0xac,
-    0xe9, 0xf2, 0x5f, 0x52, 0x6f, 0xad, 0xa7, 0xf6, 0x3c, 0x7c, 0xa1, 0x6d, 0x05
+    0xe9, 0xf2, 0x5f, 0x52, 0x6f, 0xad, 0xa7, 0xf6, 0x3c, 0x7c, 0xa1, 0x6d, 0x00
 };
-const uint8_t frame_58_wire[] = {
-    0x29, 0x81, 0x5c, 0x4c, 0x53, 0x8f, 0x4c, 0x02, 0xcc, 0xff, 0x83, 0x8d, 0x0e, 0x22, 0x14, 0x2c,
+const uint8_t frame_62_wire[] = {
+    0x24, 0x81, 0x5c, 0x4c, 0x53, 0x8f, 0x4c, 0x02, 0xcc, 0xff, 0x83, 0x8d, 0x0e, 0x22, 0x14, 0x2c,
     0xd6, 0x84, 0x89, 0x37, 0x6e, 0x90, 0x03, 0xac, 0xe9, 0xf2, 0x5f, 0x52, 0x6f, 0xad, 0xa7, 0xf6,
-    0x3c, 0x7c, 0xa1, 0x6d, 0x05, 0x43, 0xe4, 0x44, 0xb4, 0x00
+    0x3c, 0x7c, 0xa1, 0x6d, 0x05, 0x5f, 0xf0, 0xb5, 0x81, 0x00
 };
-inline bool frame_58_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_62_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::HelloReply message{};
   decode(header, head);
@@ -1292,22 +1363,22 @@ inline bool frame_58_fields_match(const uint8_t* header, const uint8_t* payload)
   137 && message.firmware_minor == 55 && message.firmware_patch == 110 && message.previous_session
   == 144 && message.reset_cause == 3 && message.limits_crc == 1609755052u && message.pose_known ==
   82 && message.pulse_ticks[0] == 44399u && message.pulse_ticks[1] == 63143u &&
-  message.pulse_ticks[2] == 31804 && message.pulse_ticks[3] == 28065 && message.sensor == 5;
+  message.pulse_ticks[2] == 31804 && message.pulse_ticks[3] == 28065 && message.sensor == 0;
 }
 // hello_reply_random_2
-const uint8_t frame_59_header[] = {
+const uint8_t frame_63_header[] = {
     0x81, 0x3b, 0x95, 0x43, 0xe3, 0x4b, 0x04
 };
-const uint8_t frame_59_payload[] = {
+const uint8_t frame_63_payload[] = {
     0x24, 0xb3, 0xf7, 0xf1, 0xde, 0x4d, 0x70, 0x96, 0x77, 0xde, 0x84, 0x12, 0xd5, 0x2e, 0x02, 0xdd,
-    0xcb, 0x9d, 0xbf, 0xe4, 0x5d, 0x76, 0xa9, 0xe1, 0x6f, 0xb1, 0xf9, 0x5e, 0x01
+    0xcb, 0x9d, 0xbf, 0xe4, 0x5d, 0x76, 0xa9, 0xe1, 0x6f, 0xb1, 0xf9, 0x5e, 0x03
 };
-const uint8_t frame_59_wire[] = {
+const uint8_t frame_63_wire[] = {
     0x29, 0x81, 0x3b, 0x95, 0x43, 0xe3, 0x4b, 0x04, 0x24, 0xb3, 0xf7, 0xf1, 0xde, 0x4d, 0x70, 0x96,
     0x77, 0xde, 0x84, 0x12, 0xd5, 0x2e, 0x02, 0xdd, 0xcb, 0x9d, 0xbf, 0xe4, 0x5d, 0x76, 0xa9, 0xe1,
-    0x6f, 0xb1, 0xf9, 0x5e, 0x01, 0x2e, 0xdd, 0xde, 0x25, 0x00
+    0x6f, 0xb1, 0xf9, 0x5e, 0x03, 0xd9, 0xad, 0xe5, 0xc4, 0x00
 };
-inline bool frame_59_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_63_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::HelloReply message{};
   decode(header, head);
@@ -1319,19 +1390,19 @@ inline bool frame_59_fields_match(const uint8_t* header, const uint8_t* payload)
   message.previous_session == 46 && message.reset_cause == 2 && message.limits_crc == 3214789597u
   && message.pose_known == 228 && message.pulse_ticks[0] == 30301 && message.pulse_ticks[1] ==
   57769u && message.pulse_ticks[2] == 45423u && message.pulse_ticks[3] == 24313 && message.sensor
-  == 1;
+  == 3;
 }
 // receipt_lowest
-const uint8_t frame_60_header[] = {
+const uint8_t frame_64_header[] = {
     0x82, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_60_payload[] = {
+const uint8_t frame_64_payload[] = {
     0x00
 };
-const uint8_t frame_60_wire[] = {
+const uint8_t frame_64_wire[] = {
     0x02, 0x82, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x05, 0xa0, 0xde, 0x51, 0x2a, 0x00
 };
-inline bool frame_60_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_64_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Receipt message{};
   decode(header, head);
@@ -1340,16 +1411,16 @@ inline bool frame_60_fields_match(const uint8_t* header, const uint8_t* payload)
   head.credit == 0 && head.epoch == 0 && head.state == 0 && message.gap == 0;
 }
 // receipt_highest
-const uint8_t frame_61_header[] = {
+const uint8_t frame_65_header[] = {
     0x82, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
 };
-const uint8_t frame_61_payload[] = {
+const uint8_t frame_65_payload[] = {
     0xff
 };
-const uint8_t frame_61_wire[] = {
+const uint8_t frame_65_wire[] = {
     0x0d, 0x82, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0x52, 0x9b, 0x0f, 0x66, 0x00
 };
-inline bool frame_61_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_65_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Receipt message{};
   decode(header, head);
@@ -1358,16 +1429,16 @@ inline bool frame_61_fields_match(const uint8_t* header, const uint8_t* payload)
   head.credit == 255 && head.epoch == 255 && head.state == 3 && message.gap == 255;
 }
 // receipt_random_1
-const uint8_t frame_62_header[] = {
+const uint8_t frame_66_header[] = {
     0x82, 0xf1, 0xd6, 0x9b, 0x65, 0xce, 0x02
 };
-const uint8_t frame_62_payload[] = {
+const uint8_t frame_66_payload[] = {
     0x3b
 };
-const uint8_t frame_62_wire[] = {
+const uint8_t frame_66_wire[] = {
     0x0d, 0x82, 0xf1, 0xd6, 0x9b, 0x65, 0xce, 0x02, 0x3b, 0xab, 0xfb, 0x4f, 0x4a, 0x00
 };
-inline bool frame_62_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_66_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Receipt message{};
   decode(header, head);
@@ -1376,16 +1447,16 @@ inline bool frame_62_fields_match(const uint8_t* header, const uint8_t* payload)
   head.credit == 101 && head.epoch == 206 && head.state == 2 && message.gap == 59;
 }
 // receipt_random_2
-const uint8_t frame_63_header[] = {
+const uint8_t frame_67_header[] = {
     0x82, 0xe1, 0x89, 0x4e, 0x60, 0x70, 0x00
 };
-const uint8_t frame_63_payload[] = {
+const uint8_t frame_67_payload[] = {
     0x52
 };
-const uint8_t frame_63_wire[] = {
+const uint8_t frame_67_wire[] = {
     0x07, 0x82, 0xe1, 0x89, 0x4e, 0x60, 0x70, 0x06, 0x52, 0x53, 0x5b, 0xa1, 0x9b, 0x00
 };
-inline bool frame_63_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_67_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Receipt message{};
   decode(header, head);
@@ -1394,17 +1465,17 @@ inline bool frame_63_fields_match(const uint8_t* header, const uint8_t* payload)
   head.credit == 96 && head.epoch == 112 && head.state == 0 && message.gap == 82;
 }
 // pong_lowest
-const uint8_t frame_64_header[] = {
+const uint8_t frame_68_header[] = {
     0x83, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_64_payload[] = {
+const uint8_t frame_68_payload[] = {
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_64_wire[] = {
+const uint8_t frame_68_wire[] = {
     0x02, 0x83, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x05, 0xf7, 0xc1, 0xc6, 0x43, 0x00
 };
-inline bool frame_64_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_68_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Pong message{};
   decode(header, head);
@@ -1414,17 +1485,17 @@ inline bool frame_64_fields_match(const uint8_t* header, const uint8_t* payload)
   0 && message.phase_us == 0;
 }
 // pong_highest
-const uint8_t frame_65_header[] = {
+const uint8_t frame_69_header[] = {
     0x83, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
 };
-const uint8_t frame_65_payload[] = {
+const uint8_t frame_69_payload[] = {
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff
 };
-const uint8_t frame_65_wire[] = {
+const uint8_t frame_69_wire[] = {
     0x16, 0x83, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0x63, 0x02, 0xfa, 0x66, 0x00
 };
-inline bool frame_65_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_69_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Pong message{};
   decode(header, head);
@@ -1434,17 +1505,17 @@ inline bool frame_65_fields_match(const uint8_t* header, const uint8_t* payload)
   message.frame == 4294967295u && message.phase_us == 65535u;
 }
 // pong_random_1
-const uint8_t frame_66_header[] = {
+const uint8_t frame_70_header[] = {
     0x83, 0xdb, 0x51, 0xb6, 0xc5, 0x00, 0x05
 };
-const uint8_t frame_66_payload[] = {
+const uint8_t frame_70_payload[] = {
     0x10, 0x54, 0x7d, 0x9a, 0x4d, 0xc6, 0x92, 0xeb, 0x77, 0x15
 };
-const uint8_t frame_66_wire[] = {
+const uint8_t frame_70_wire[] = {
     0x06, 0x83, 0xdb, 0x51, 0xb6, 0xc5, 0x10, 0x05, 0x10, 0x54, 0x7d, 0x9a, 0x4d, 0xc6, 0x92, 0xeb,
     0x77, 0x15, 0x7d, 0x86, 0x71, 0xdd, 0x00
 };
-inline bool frame_66_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_70_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Pong message{};
   decode(header, head);
@@ -1454,17 +1525,17 @@ inline bool frame_66_fields_match(const uint8_t* header, const uint8_t* payload)
   message.frame == 3952264781u && message.phase_us == 5495;
 }
 // pong_random_2
-const uint8_t frame_67_header[] = {
+const uint8_t frame_71_header[] = {
     0x83, 0xa5, 0xdd, 0x18, 0xc1, 0x14, 0x01
 };
-const uint8_t frame_67_payload[] = {
+const uint8_t frame_71_payload[] = {
     0xc2, 0xc4, 0x44, 0x5e, 0xb6, 0x87, 0xce, 0xe9, 0x95, 0x0b
 };
-const uint8_t frame_67_wire[] = {
+const uint8_t frame_71_wire[] = {
     0x16, 0x83, 0xa5, 0xdd, 0x18, 0xc1, 0x14, 0x01, 0xc2, 0xc4, 0x44, 0x5e, 0xb6, 0x87, 0xce, 0xe9,
     0x95, 0x0b, 0x42, 0x0b, 0x5c, 0xfd, 0x00
 };
-inline bool frame_67_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_71_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Pong message{};
   decode(header, head);
@@ -1474,21 +1545,21 @@ inline bool frame_67_fields_match(const uint8_t* header, const uint8_t* payload)
   message.frame == 3922626486u && message.phase_us == 2965;
 }
 // telemetry_lowest
-const uint8_t frame_68_header[] = {
+const uint8_t frame_72_header[] = {
     0x84, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_68_payload[] = {
+const uint8_t frame_72_payload[] = {
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x80, 0x00, 0x00, 0x00, 0x00, 0x80, 0x00, 0x00, 0x00, 0x00,
     0x00, 0x80, 0x00, 0x00, 0x00, 0x00, 0x00, 0x80, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_68_wire[] = {
+const uint8_t frame_72_wire[] = {
     0x02, 0x84, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x02, 0x80, 0x01,
     0x01, 0x01, 0x02, 0x80, 0x01, 0x01, 0x01, 0x01, 0x02, 0x80, 0x01, 0x01, 0x01, 0x01, 0x02, 0x80,
     0x01, 0x01, 0x01, 0x01, 0x05, 0x80, 0x7d, 0xd9, 0xbb, 0x00
 };
-inline bool frame_68_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_72_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Telemetry message{};
   decode(header, head);
@@ -1505,21 +1576,21 @@ inline bool frame_68_fields_match(const uint8_t* header, const uint8_t* payload)
   message.underruns == 0;
 }
 // telemetry_highest
-const uint8_t frame_69_header[] = {
+const uint8_t frame_73_header[] = {
     0x84, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
 };
-const uint8_t frame_69_payload[] = {
+const uint8_t frame_73_payload[] = {
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
-    0x02, 0xff, 0x05, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff,
+    0x02, 0xff, 0x07, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff,
     0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff
 };
-const uint8_t frame_69_wire[] = {
+const uint8_t frame_73_wire[] = {
     0x39, 0x84, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
-    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x02, 0xff, 0x05, 0xff, 0xff, 0xff, 0x7f, 0xff,
+    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x02, 0xff, 0x07, 0xff, 0xff, 0xff, 0x7f, 0xff,
     0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f,
-    0xff, 0xff, 0xff, 0xff, 0xff, 0xfa, 0x76, 0x37, 0xa2, 0x00
+    0xff, 0xff, 0xff, 0xff, 0xff, 0xba, 0x53, 0x4a, 0x1e, 0x00
 };
-inline bool frame_69_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_73_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Telemetry message{};
   decode(header, head);
@@ -1529,28 +1600,28 @@ inline bool frame_69_fields_match(const uint8_t* header, const uint8_t* payload)
   message.phase_us == 65535u && message.pulse_ticks[0] == 65535u && message.pulse_ticks[1] ==
   65535u && message.pulse_ticks[2] == 65535u && message.pulse_ticks[3] == 65535u &&
   message.attached == 255 && message.queued == 255 && message.guard == 2 && message.reflex_running
-  == 255 && message.sensor == 5 && message.baseline_raw == 2147483647u && message.sample_count ==
+  == 255 && message.sensor == 7 && message.baseline_raw == 2147483647u && message.sample_count ==
   255 && message.samples[0].pressure_raw == 2147483647u && message.samples[0].age_us == 65535u &&
   message.samples[1].pressure_raw == 2147483647u && message.samples[1].age_us == 65535u &&
   message.samples[2].pressure_raw == 2147483647u && message.samples[2].age_us == 65535u &&
   message.rx_damaged == 255 && message.stop_number == 255 && message.underruns == 255;
 }
 // telemetry_random_1
-const uint8_t frame_70_header[] = {
+const uint8_t frame_74_header[] = {
     0x84, 0xe3, 0xd5, 0x1c, 0x8d, 0xf6, 0x00
 };
-const uint8_t frame_70_payload[] = {
+const uint8_t frame_74_payload[] = {
     0x06, 0x3e, 0xbe, 0xaa, 0xda, 0xb7, 0x20, 0x40, 0x8d, 0xd2, 0xe7, 0xcb, 0xe8, 0x37, 0x95, 0xed,
-    0x01, 0xb0, 0x04, 0x2e, 0xf2, 0x61, 0x74, 0x5c, 0x05, 0x0e, 0x3f, 0x48, 0x1f, 0x89, 0x89, 0xe8,
-    0xdc, 0x7d, 0x92, 0x9f, 0x2b, 0x87, 0x0d, 0x8e, 0x2c, 0xb2, 0x3f, 0x90, 0xa4
+    0x01, 0xb0, 0x00, 0xbb, 0xbb, 0x1f, 0x2a, 0x9b, 0x8b, 0xd1, 0x61, 0x77, 0x1b, 0x1c, 0x77, 0xc5,
+    0x9b, 0x9f, 0xa7, 0xa4, 0x2f, 0xa4, 0xb6, 0x4d, 0xb4, 0x14, 0x6e, 0x4f, 0x4c
 };
-const uint8_t frame_70_wire[] = {
-    0x07, 0x84, 0xe3, 0xd5, 0x1c, 0x8d, 0xf6, 0x32, 0x06, 0x3e, 0xbe, 0xaa, 0xda, 0xb7, 0x20, 0x40,
-    0x8d, 0xd2, 0xe7, 0xcb, 0xe8, 0x37, 0x95, 0xed, 0x01, 0xb0, 0x04, 0x2e, 0xf2, 0x61, 0x74, 0x5c,
-    0x05, 0x0e, 0x3f, 0x48, 0x1f, 0x89, 0x89, 0xe8, 0xdc, 0x7d, 0x92, 0x9f, 0x2b, 0x87, 0x0d, 0x8e,
-    0x2c, 0xb2, 0x3f, 0x90, 0xa4, 0x9b, 0x83, 0xa2, 0xa6, 0x00
+const uint8_t frame_74_wire[] = {
+    0x07, 0x84, 0xe3, 0xd5, 0x1c, 0x8d, 0xf6, 0x13, 0x06, 0x3e, 0xbe, 0xaa, 0xda, 0xb7, 0x20, 0x40,
+    0x8d, 0xd2, 0xe7, 0xcb, 0xe8, 0x37, 0x95, 0xed, 0x01, 0xb0, 0x1f, 0xbb, 0xbb, 0x1f, 0x2a, 0x9b,
+    0x8b, 0xd1, 0x61, 0x77, 0x1b, 0x1c, 0x77, 0xc5, 0x9b, 0x9f, 0xa7, 0xa4, 0x2f, 0xa4, 0xb6, 0x4d,
+    0xb4, 0x14, 0x6e, 0x4f, 0x4c, 0x89, 0xc4, 0xcb, 0x69, 0x00
 };
-inline bool frame_70_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_74_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Telemetry message{};
   decode(header, head);
@@ -1560,28 +1631,28 @@ inline bool frame_70_fields_match(const uint8_t* header, const uint8_t* payload)
   message.phase_us == 47066u && message.pulse_ticks[0] == 16416 && message.pulse_ticks[1] == 53901u
   && message.pulse_ticks[2] == 52199u && message.pulse_ticks[3] == 14312 && message.attached == 149
   && message.queued == 237 && message.guard == 1 && message.reflex_running == 176 && message.sensor
-  == 4 && message.baseline_raw == 1952576046u && message.sample_count == 92 &&
-  message.samples[0].pressure_raw == 1212091909u && message.samples[0].age_us == 35103u &&
-  message.samples[1].pressure_raw == 2111629449u && message.samples[1].age_us == 40850u &&
-  message.samples[2].pressure_raw == -1911716053 && message.samples[2].age_us == 45612u &&
-  message.rx_damaged == 63 && message.stop_number == 144 && message.underruns == 164;
+  == 0 && message.baseline_raw == 706722747u && message.sample_count == 155 &&
+  message.samples[0].pressure_raw == 2002899339u && message.samples[0].age_us == 7195 &&
+  message.samples[1].pressure_raw == -1617181321 && message.samples[1].age_us == 42151u &&
+  message.samples[2].pressure_raw == 1303815215u && message.samples[2].age_us == 5300 &&
+  message.rx_damaged == 110 && message.stop_number == 79 && message.underruns == 76;
 }
 // telemetry_random_2
-const uint8_t frame_71_header[] = {
+const uint8_t frame_75_header[] = {
     0x84, 0xe5, 0x5e, 0xd3, 0xf7, 0x9f, 0x04
 };
-const uint8_t frame_71_payload[] = {
+const uint8_t frame_75_payload[] = {
     0x77, 0xc3, 0xc9, 0x0d, 0x43, 0xda, 0x19, 0x6b, 0xe7, 0x79, 0x9a, 0xdc, 0x0b, 0x00, 0x8a, 0x6b,
-    0x02, 0x48, 0x01, 0xd4, 0xea, 0x4c, 0xbe, 0xcc, 0x04, 0xe9, 0x00, 0x5a, 0x1b, 0xd1, 0xa1, 0x18,
+    0x02, 0x48, 0x02, 0xd4, 0xea, 0x4c, 0xbe, 0xcc, 0x04, 0xe9, 0x00, 0x5a, 0x1b, 0xd1, 0xa1, 0x18,
     0xbf, 0x23, 0x1b, 0x2b, 0x32, 0xa3, 0x3c, 0x6b, 0x58, 0xff, 0xb4, 0x61, 0xb6
 };
-const uint8_t frame_71_wire[] = {
+const uint8_t frame_75_wire[] = {
     0x15, 0x84, 0xe5, 0x5e, 0xd3, 0xf7, 0x9f, 0x04, 0x77, 0xc3, 0xc9, 0x0d, 0x43, 0xda, 0x19, 0x6b,
-    0xe7, 0x79, 0x9a, 0xdc, 0x0b, 0x0d, 0x8a, 0x6b, 0x02, 0x48, 0x01, 0xd4, 0xea, 0x4c, 0xbe, 0xcc,
+    0xe7, 0x79, 0x9a, 0xdc, 0x0b, 0x0d, 0x8a, 0x6b, 0x02, 0x48, 0x02, 0xd4, 0xea, 0x4c, 0xbe, 0xcc,
     0x04, 0xe9, 0x17, 0x5a, 0x1b, 0xd1, 0xa1, 0x18, 0xbf, 0x23, 0x1b, 0x2b, 0x32, 0xa3, 0x3c, 0x6b,
-    0x58, 0xff, 0xb4, 0x61, 0xb6, 0x23, 0xaf, 0x1a, 0xae, 0x00
+    0x58, 0xff, 0xb4, 0x61, 0xb6, 0xc3, 0x18, 0x59, 0x4c, 0x00
 };
-inline bool frame_71_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_75_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Telemetry message{};
   decode(header, head);
@@ -1591,29 +1662,29 @@ inline bool frame_71_fields_match(const uint8_t* header, const uint8_t* payload)
   message.phase_us == 55875u && message.pulse_ticks[0] == 27417 && message.pulse_ticks[1] == 31207
   && message.pulse_ticks[2] == 56474u && message.pulse_ticks[3] == 11 && message.attached == 138 &&
   message.queued == 107 && message.guard == 2 && message.reflex_running == 72 && message.sensor ==
-  1 && message.baseline_raw == -1102255404 && message.sample_count == 204 &&
+  2 && message.baseline_raw == -1102255404 && message.sample_count == 204 &&
   message.samples[0].pressure_raw == 1510009092u && message.samples[0].age_us == 53531u &&
   message.samples[1].pressure_raw == 599726241u && message.samples[1].age_us == 11035 &&
   message.samples[2].pressure_raw == 1799136050u && message.samples[2].age_us == 65368u &&
   message.rx_damaged == 180 && message.stop_number == 97 && message.underruns == 182;
 }
 // trip_lowest
-const uint8_t frame_72_header[] = {
+const uint8_t frame_76_header[] = {
     0x85, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_72_payload[] = {
+const uint8_t frame_76_payload[] = {
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x80, 0x00, 0x00, 0x00,
     0x80, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
     0x00
 };
-const uint8_t frame_72_wire[] = {
+const uint8_t frame_76_wire[] = {
     0x02, 0x85, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x01, 0x01, 0x02, 0x80, 0x01, 0x01, 0x02, 0x80, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x05, 0x49, 0x42, 0x44, 0x11, 0x00
 };
-inline bool frame_72_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_76_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Trip message{};
   decode(header, head);
@@ -1631,22 +1702,22 @@ inline bool frame_72_fields_match(const uint8_t* header, const uint8_t* payload)
   0 && message.pulse_ticks[3][3] == 0;
 }
 // trip_highest
-const uint8_t frame_73_header[] = {
+const uint8_t frame_77_header[] = {
     0x85, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
 };
-const uint8_t frame_73_payload[] = {
+const uint8_t frame_77_payload[] = {
     0xff, 0xff, 0x02, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff,
     0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff
 };
-const uint8_t frame_73_wire[] = {
+const uint8_t frame_77_wire[] = {
     0x3d, 0x85, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0x02, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xc7, 0xbb, 0xcd, 0xf9, 0x00
 };
-inline bool frame_73_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_77_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Trip message{};
   decode(header, head);
@@ -1665,22 +1736,22 @@ inline bool frame_73_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pulse_ticks[3][2] == 65535u && message.pulse_ticks[3][3] == 65535u;
 }
 // trip_random_1
-const uint8_t frame_74_header[] = {
+const uint8_t frame_78_header[] = {
     0x85, 0x32, 0xac, 0x73, 0x8b, 0xa5, 0x05
 };
-const uint8_t frame_74_payload[] = {
+const uint8_t frame_78_payload[] = {
     0xaa, 0x54, 0x00, 0x70, 0xa5, 0x55, 0xe9, 0xd8, 0xb2, 0x63, 0x81, 0x4f, 0xc6, 0xe6, 0x8b, 0x37,
     0x63, 0x4c, 0x80, 0xb5, 0x75, 0xd0, 0xe9, 0x39, 0xe2, 0x08, 0xb9, 0x46, 0x3a, 0x39, 0xe2, 0x5d,
     0xe0, 0xa2, 0xc2, 0x9a, 0xe0, 0x17, 0x89, 0x50, 0xf2, 0xa1, 0x92, 0xcb, 0x89, 0x13, 0x8a, 0x89,
     0x44
 };
-const uint8_t frame_74_wire[] = {
+const uint8_t frame_78_wire[] = {
     0x0a, 0x85, 0x32, 0xac, 0x73, 0x8b, 0xa5, 0x05, 0xaa, 0x54, 0x33, 0x70, 0xa5, 0x55, 0xe9, 0xd8,
     0xb2, 0x63, 0x81, 0x4f, 0xc6, 0xe6, 0x8b, 0x37, 0x63, 0x4c, 0x80, 0xb5, 0x75, 0xd0, 0xe9, 0x39,
     0xe2, 0x08, 0xb9, 0x46, 0x3a, 0x39, 0xe2, 0x5d, 0xe0, 0xa2, 0xc2, 0x9a, 0xe0, 0x17, 0x89, 0x50,
     0xf2, 0xa1, 0x92, 0xcb, 0x89, 0x13, 0x8a, 0x89, 0x44, 0xd1, 0xf0, 0x8c, 0x91, 0x00
 };
-inline bool frame_74_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_78_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Trip message{};
   decode(header, head);
@@ -1699,22 +1770,22 @@ inline bool frame_74_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pulse_ticks[3][2] == 35347u && message.pulse_ticks[3][3] == 17545;
 }
 // trip_random_2
-const uint8_t frame_75_header[] = {
+const uint8_t frame_79_header[] = {
     0x85, 0x69, 0xd5, 0x9a, 0x76, 0x01, 0x01
 };
-const uint8_t frame_75_payload[] = {
+const uint8_t frame_79_payload[] = {
     0xe3, 0xe5, 0x00, 0x4f, 0xa9, 0xe4, 0xb7, 0xd1, 0xf6, 0xba, 0xa5, 0xfa, 0xae, 0x93, 0x1c, 0x86,
     0x35, 0x24, 0x52, 0xfc, 0x07, 0x60, 0x21, 0xb0, 0x70, 0xbb, 0xb2, 0x12, 0x94, 0x91, 0xcc, 0x7d,
     0x0f, 0x48, 0xfe, 0x68, 0xcf, 0xbb, 0x57, 0x58, 0xbd, 0x29, 0x30, 0xd1, 0x75, 0x1c, 0xb9, 0x1a,
     0x84
 };
-const uint8_t frame_75_wire[] = {
+const uint8_t frame_79_wire[] = {
     0x0a, 0x85, 0x69, 0xd5, 0x9a, 0x76, 0x01, 0x01, 0xe3, 0xe5, 0x33, 0x4f, 0xa9, 0xe4, 0xb7, 0xd1,
     0xf6, 0xba, 0xa5, 0xfa, 0xae, 0x93, 0x1c, 0x86, 0x35, 0x24, 0x52, 0xfc, 0x07, 0x60, 0x21, 0xb0,
     0x70, 0xbb, 0xb2, 0x12, 0x94, 0x91, 0xcc, 0x7d, 0x0f, 0x48, 0xfe, 0x68, 0xcf, 0xbb, 0x57, 0x58,
     0xbd, 0x29, 0x30, 0xd1, 0x75, 0x1c, 0xb9, 0x1a, 0x84, 0xac, 0x62, 0xcd, 0x75, 0x00
 };
-inline bool frame_75_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_79_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Trip message{};
   decode(header, head);
@@ -1733,116 +1804,116 @@ inline bool frame_75_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pulse_ticks[3][2] == 47388u && message.pulse_ticks[3][3] == 33818u;
 }
 // fault_lowest
-const uint8_t frame_76_header[] = {
+const uint8_t frame_80_header[] = {
     0x86, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_76_payload[] = {
+const uint8_t frame_80_payload[] = {
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
-    0x00, 0x00, 0x00, 0x00, 0x00
+    0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_76_wire[] = {
+const uint8_t frame_80_wire[] = {
     0x02, 0x86, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
-    0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x05, 0x92, 0x2f, 0x9f,
-    0x1a, 0x00
+    0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x05, 0x9e, 0x40,
+    0xf4, 0x21, 0x00
 };
-inline bool frame_76_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_80_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::FaultMessage message{};
   decode(header, head);
   decode(payload, message);
   return head.type == 134 && head.session == 0 && head.sequence == 0 && head.expected == 0 &&
   head.credit == 0 && head.epoch == 0 && head.state == 0 && message.record_id == 0 &&
-  message.session == 0 && message.fault == 0 && message.detail == 0 && message.frame == 0 &&
-  message.phase_us == 0 && message.pulse_ticks[0] == 0 && message.pulse_ticks[1] == 0 &&
-  message.pulse_ticks[2] == 0 && message.pulse_ticks[3] == 0;
+  message.session == 0 && message.further == 0 && message.fault == 0 && message.detail == 0 &&
+  message.frame == 0 && message.phase_us == 0 && message.pulse_ticks[0] == 0 &&
+  message.pulse_ticks[1] == 0 && message.pulse_ticks[2] == 0 && message.pulse_ticks[3] == 0;
 }
 // fault_highest
-const uint8_t frame_77_header[] = {
+const uint8_t frame_81_header[] = {
     0x86, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
 };
-const uint8_t frame_77_payload[] = {
-    0xff, 0xff, 0x08, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
-    0xff, 0xff, 0xff, 0xff, 0xff
+const uint8_t frame_81_payload[] = {
+    0xff, 0xff, 0xff, 0x0a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
+    0xff, 0xff, 0xff, 0xff, 0xff, 0xff
 };
-const uint8_t frame_77_wire[] = {
-    0x21, 0x86, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0x08, 0xff, 0xff, 0xff, 0xff, 0xff,
-    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xaf, 0xec, 0xf7,
-    0x4d, 0x00
+const uint8_t frame_81_wire[] = {
+    0x22, 0x86, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0x0a, 0xff, 0xff, 0xff, 0xff,
+    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x98, 0xee,
+    0xb9, 0xfb, 0x00
 };
-inline bool frame_77_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_81_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::FaultMessage message{};
   decode(header, head);
   decode(payload, message);
   return head.type == 134 && head.session == 255 && head.sequence == 255 && head.expected == 255 &&
   head.credit == 255 && head.epoch == 255 && head.state == 3 && message.record_id == 255 &&
-  message.session == 255 && message.fault == 8 && message.detail == 4294967295u && message.frame ==
-  4294967295u && message.phase_us == 65535u && message.pulse_ticks[0] == 65535u &&
-  message.pulse_ticks[1] == 65535u && message.pulse_ticks[2] == 65535u && message.pulse_ticks[3] ==
-  65535u;
+  message.session == 255 && message.further == 255 && message.fault == 10 && message.detail ==
+  4294967295u && message.frame == 4294967295u && message.phase_us == 65535u &&
+  message.pulse_ticks[0] == 65535u && message.pulse_ticks[1] == 65535u && message.pulse_ticks[2] ==
+  65535u && message.pulse_ticks[3] == 65535u;
 }
 // fault_random_1
-const uint8_t frame_78_header[] = {
+const uint8_t frame_82_header[] = {
     0x86, 0xe1, 0xef, 0x7a, 0x0a, 0xfa, 0x01
 };
-const uint8_t frame_78_payload[] = {
-    0x72, 0x56, 0x08, 0x85, 0x1e, 0x2b, 0x7f, 0x85, 0xd6, 0x9e, 0xa4, 0xd9, 0x88, 0x87, 0xa9, 0x46,
-    0x2a, 0x7f, 0xe3, 0xbe, 0x37
+const uint8_t frame_82_payload[] = {
+    0x72, 0x56, 0xfe, 0x00, 0x85, 0xd6, 0x9e, 0xa4, 0x94, 0xf1, 0x6c, 0x44, 0x46, 0x2a, 0x7f, 0xe3,
+    0xbe, 0x37, 0x22, 0x85, 0xf0, 0xaa
 };
-const uint8_t frame_78_wire[] = {
-    0x21, 0x86, 0xe1, 0xef, 0x7a, 0x0a, 0xfa, 0x01, 0x72, 0x56, 0x08, 0x85, 0x1e, 0x2b, 0x7f, 0x85,
-    0xd6, 0x9e, 0xa4, 0xd9, 0x88, 0x87, 0xa9, 0x46, 0x2a, 0x7f, 0xe3, 0xbe, 0x37, 0xd2, 0x80, 0xdd,
-    0x2d, 0x00
+const uint8_t frame_82_wire[] = {
+    0x0b, 0x86, 0xe1, 0xef, 0x7a, 0x0a, 0xfa, 0x01, 0x72, 0x56, 0xfe, 0x17, 0x85, 0xd6, 0x9e, 0xa4,
+    0x94, 0xf1, 0x6c, 0x44, 0x46, 0x2a, 0x7f, 0xe3, 0xbe, 0x37, 0x22, 0x85, 0xf0, 0xaa, 0x4f, 0x36,
+    0xba, 0x07, 0x00
 };
-inline bool frame_78_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_82_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::FaultMessage message{};
   decode(header, head);
   decode(payload, message);
   return head.type == 134 && head.session == 225 && head.sequence == 239 && head.expected == 122 &&
   head.credit == 10 && head.epoch == 250 && head.state == 1 && message.record_id == 114 &&
-  message.session == 86 && message.fault == 8 && message.detail == 2133532293u && message.frame ==
-  2761873029u && message.phase_us == 35033u && message.pulse_ticks[0] == 43399u &&
-  message.pulse_ticks[1] == 10822 && message.pulse_ticks[2] == 58239u && message.pulse_ticks[3] ==
-  14270;
+  message.session == 86 && message.further == 254 && message.fault == 0 && message.detail ==
+  2761873029u && message.frame == 1147990420u && message.phase_us == 10822 &&
+  message.pulse_ticks[0] == 58239u && message.pulse_ticks[1] == 14270 && message.pulse_ticks[2] ==
+  34082u && message.pulse_ticks[3] == 43760u;
 }
 // fault_random_2
-const uint8_t frame_79_header[] = {
+const uint8_t frame_83_header[] = {
     0x86, 0xfc, 0x8d, 0x00, 0xd0, 0xd1, 0x05
 };
-const uint8_t frame_79_payload[] = {
-    0x19, 0x9c, 0x08, 0xe6, 0x30, 0x98, 0x6d, 0x90, 0x2d, 0xf1, 0x58, 0xcb, 0xd1, 0xb5, 0x9b, 0x5b,
-    0xdc, 0x09, 0x38, 0x7a, 0xb2
+const uint8_t frame_83_payload[] = {
+    0x19, 0x9c, 0xdb, 0x01, 0x90, 0x2d, 0xf1, 0x58, 0x76, 0x5b, 0x4c, 0xc2, 0xb5, 0x9b, 0x5b, 0xdc,
+    0x09, 0x38, 0x7a, 0xb2, 0x1b, 0x01
 };
-const uint8_t frame_79_wire[] = {
-    0x04, 0x86, 0xfc, 0x8d, 0x1d, 0xd0, 0xd1, 0x05, 0x19, 0x9c, 0x08, 0xe6, 0x30, 0x98, 0x6d, 0x90,
-    0x2d, 0xf1, 0x58, 0xcb, 0xd1, 0xb5, 0x9b, 0x5b, 0xdc, 0x09, 0x38, 0x7a, 0xb2, 0xfe, 0x5a, 0x69,
-    0x75, 0x00
+const uint8_t frame_83_wire[] = {
+    0x04, 0x86, 0xfc, 0x8d, 0x1e, 0xd0, 0xd1, 0x05, 0x19, 0x9c, 0xdb, 0x01, 0x90, 0x2d, 0xf1, 0x58,
+    0x76, 0x5b, 0x4c, 0xc2, 0xb5, 0x9b, 0x5b, 0xdc, 0x09, 0x38, 0x7a, 0xb2, 0x1b, 0x01, 0x3a, 0x63,
+    0x35, 0x19, 0x00
 };
-inline bool frame_79_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_83_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::FaultMessage message{};
   decode(header, head);
   decode(payload, message);
   return head.type == 134 && head.session == 252 && head.sequence == 141 && head.expected == 0 &&
   head.credit == 208 && head.epoch == 209 && head.state == 5 && message.record_id == 25 &&
-  message.session == 156 && message.fault == 8 && message.detail == 1838690534u && message.frame ==
-  1492200848u && message.phase_us == 53707u && message.pulse_ticks[0] == 39861u &&
-  message.pulse_ticks[1] == 56411u && message.pulse_ticks[2] == 14345 && message.pulse_ticks[3] ==
-  45690u;
+  message.session == 156 && message.further == 219 && message.fault == 1 && message.detail ==
+  1492200848u && message.frame == 3259784054u && message.phase_us == 39861u &&
+  message.pulse_ticks[0] == 56411u && message.pulse_ticks[1] == 14345 && message.pulse_ticks[2] ==
+  45690u && message.pulse_ticks[3] == 283;
 }
 // refusal_lowest
-const uint8_t frame_80_header[] = {
+const uint8_t frame_84_header[] = {
     0x87, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_80_payload[] = {
+const uint8_t frame_84_payload[] = {
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x80, 0x00, 0x00, 0x00, 0x80
 };
-const uint8_t frame_80_wire[] = {
+const uint8_t frame_84_wire[] = {
     0x02, 0x87, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x02, 0x80, 0x01, 0x01, 0x06, 0x80, 0x90, 0x3f, 0x6e, 0x98, 0x00
 };
-inline bool frame_80_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_84_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::RefusalMessage message{};
   decode(header, head);
@@ -1854,17 +1925,17 @@ inline bool frame_80_fields_match(const uint8_t* header, const uint8_t* payload)
   INT32_MIN;
 }
 // refusal_highest
-const uint8_t frame_81_header[] = {
+const uint8_t frame_85_header[] = {
     0x87, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
 };
-const uint8_t frame_81_payload[] = {
-    0xff, 0xff, 0xff, 0xff, 0x10, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0x7f
+const uint8_t frame_85_payload[] = {
+    0xff, 0xff, 0xff, 0xff, 0x12, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 0x7f
 };
-const uint8_t frame_81_wire[] = {
-    0x1a, 0x87, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0xff, 0x10, 0xff, 0xff, 0xff,
-    0xff, 0x7f, 0xff, 0xff, 0xff, 0x7f, 0x7d, 0xbf, 0xd6, 0xab, 0x00
+const uint8_t frame_85_wire[] = {
+    0x1a, 0x87, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0xff, 0x12, 0xff, 0xff, 0xff,
+    0xff, 0x7f, 0xff, 0xff, 0xff, 0x7f, 0xc6, 0x3e, 0x96, 0x38, 0x00
 };
-inline bool frame_81_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_85_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::RefusalMessage message{};
   decode(header, head);
@@ -1872,21 +1943,21 @@ inline bool frame_81_fields_match(const uint8_t* header, const uint8_t* payload)
   return head.type == 135 && head.session == 255 && head.sequence == 255 && head.expected == 255 &&
   head.credit == 255 && head.epoch == 255 && head.state == 3 && message.record_id == 255 &&
   message.session == 255 && message.command_type == 255 && message.command_sequence == 255 &&
-  message.reason == 16 && message.index == 255 && message.value == 2147483647u && message.limit ==
+  message.reason == 18 && message.index == 255 && message.value == 2147483647u && message.limit ==
   2147483647u;
 }
 // refusal_random_1
-const uint8_t frame_82_header[] = {
+const uint8_t frame_86_header[] = {
     0x87, 0x17, 0xee, 0x5b, 0x1c, 0xe5, 0x03
 };
-const uint8_t frame_82_payload[] = {
+const uint8_t frame_86_payload[] = {
     0x9c, 0x03, 0x95, 0x44, 0x09, 0x38, 0x4b, 0x91, 0x6b, 0x24, 0x61, 0xc7, 0x60, 0x5b
 };
-const uint8_t frame_82_wire[] = {
+const uint8_t frame_86_wire[] = {
     0x1a, 0x87, 0x17, 0xee, 0x5b, 0x1c, 0xe5, 0x03, 0x9c, 0x03, 0x95, 0x44, 0x09, 0x38, 0x4b, 0x91,
     0x6b, 0x24, 0x61, 0xc7, 0x60, 0x5b, 0xfc, 0x1d, 0xef, 0x24, 0x00
 };
-inline bool frame_82_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_86_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::RefusalMessage message{};
   decode(header, head);
@@ -1898,17 +1969,17 @@ inline bool frame_82_fields_match(const uint8_t* header, const uint8_t* payload)
   1533069153u;
 }
 // refusal_random_2
-const uint8_t frame_83_header[] = {
+const uint8_t frame_87_header[] = {
     0x87, 0xb4, 0x69, 0xf5, 0x0d, 0x19, 0x05
 };
-const uint8_t frame_83_payload[] = {
+const uint8_t frame_87_payload[] = {
     0x7f, 0x68, 0xac, 0x6c, 0x05, 0x2a, 0xf3, 0x7a, 0xf6, 0xaa, 0x24, 0x99, 0x04, 0xcd
 };
-const uint8_t frame_83_wire[] = {
+const uint8_t frame_87_wire[] = {
     0x1a, 0x87, 0xb4, 0x69, 0xf5, 0x0d, 0x19, 0x05, 0x7f, 0x68, 0xac, 0x6c, 0x05, 0x2a, 0xf3, 0x7a,
     0xf6, 0xaa, 0x24, 0x99, 0x04, 0xcd, 0x4c, 0xb2, 0xbb, 0xf4, 0x00
 };
-inline bool frame_83_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_87_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::RefusalMessage message{};
   decode(header, head);
@@ -1920,21 +1991,21 @@ inline bool frame_83_fields_match(const uint8_t* header, const uint8_t* payload)
   -855336668;
 }
 // limits_lowest
-const uint8_t frame_84_header[] = {
+const uint8_t frame_88_header[] = {
     0x88, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_84_payload[] = {
+const uint8_t frame_88_payload[] = {
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
     0x00, 0x00, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80,
-    0x00, 0x80, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
+    0x00, 0x80, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
 };
-const uint8_t frame_84_wire[] = {
+const uint8_t frame_88_wire[] = {
     0x02, 0x88, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
     0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x02, 0x80, 0x02, 0x80, 0x02, 0x80,
-    0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x01, 0x01, 0x01, 0x01, 0x01, 0x05,
-    0x24, 0x1f, 0x09, 0xf8, 0x00
+    0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x02, 0x80, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
+    0x05, 0x8f, 0x43, 0xa2, 0xb5, 0x00
 };
-inline bool frame_84_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_88_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Limits message{};
   decode(header, head);
@@ -1948,24 +2019,25 @@ inline bool frame_84_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pair_sum_max_ticks[0] == -32768 && message.pair_sum_max_ticks[1] == -32768 &&
   message.pair_difference_min_ticks[0] == -32768 && message.pair_difference_min_ticks[1] == -32768
   && message.pair_difference_max_ticks[0] == -32768 && message.pair_difference_max_ticks[1] ==
-  -32768 && message.coarse_threshold_raw == 0 && message.hold_timeout_s == 0;
+  -32768 && message.coarse_threshold_raw == 0 && message.hold_timeout_s == 0 && message.stop_switch
+  == 0;
 }
 // limits_highest
-const uint8_t frame_85_header[] = {
+const uint8_t frame_89_header[] = {
     0x88, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
 };
-const uint8_t frame_85_payload[] = {
+const uint8_t frame_89_payload[] = {
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f,
-    0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff
+    0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff
 };
-const uint8_t frame_85_wire[] = {
-    0x34, 0x88, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
+const uint8_t frame_89_wire[] = {
+    0x35, 0x88, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
     0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f,
     0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
-    0x86, 0x1a, 0x6c, 0xd7, 0x00
+    0xff, 0x8a, 0xb0, 0x80, 0x5b, 0x00
 };
-inline bool frame_85_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_89_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Limits message{};
   decode(header, head);
@@ -1980,24 +2052,25 @@ inline bool frame_85_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pair_sum_max_ticks[0] == 32767 && message.pair_sum_max_ticks[1] == 32767 &&
   message.pair_difference_min_ticks[0] == 32767 && message.pair_difference_min_ticks[1] == 32767 &&
   message.pair_difference_max_ticks[0] == 32767 && message.pair_difference_max_ticks[1] == 32767 &&
-  message.coarse_threshold_raw == 4294967295u && message.hold_timeout_s == 65535u;
+  message.coarse_threshold_raw == 4294967295u && message.hold_timeout_s == 65535u &&
+  message.stop_switch == 255;
 }
 // limits_random_1
-const uint8_t frame_86_header[] = {
+const uint8_t frame_90_header[] = {
     0x88, 0xab, 0x8f, 0xf2, 0x4d, 0x6e, 0x03
 };
-const uint8_t frame_86_payload[] = {
+const uint8_t frame_90_payload[] = {
     0x62, 0x09, 0x0b, 0xc3, 0x24, 0x4b, 0xa5, 0x4b, 0xa9, 0x36, 0x1e, 0x20, 0x69, 0xf1, 0x81, 0x8e,
     0x49, 0x2b, 0x45, 0x0d, 0xc4, 0x47, 0x38, 0xe4, 0xfd, 0x15, 0x0c, 0x3c, 0x4a, 0x65, 0x79, 0x65,
-    0x4b, 0x95, 0x24, 0x2f, 0x87, 0xad, 0x53, 0xc6
+    0x4b, 0x95, 0x24, 0x2f, 0x87, 0xad, 0x53, 0xc6, 0x2d
 };
-const uint8_t frame_86_wire[] = {
-    0x34, 0x88, 0xab, 0x8f, 0xf2, 0x4d, 0x6e, 0x03, 0x62, 0x09, 0x0b, 0xc3, 0x24, 0x4b, 0xa5, 0x4b,
+const uint8_t frame_90_wire[] = {
+    0x35, 0x88, 0xab, 0x8f, 0xf2, 0x4d, 0x6e, 0x03, 0x62, 0x09, 0x0b, 0xc3, 0x24, 0x4b, 0xa5, 0x4b,
     0xa9, 0x36, 0x1e, 0x20, 0x69, 0xf1, 0x81, 0x8e, 0x49, 0x2b, 0x45, 0x0d, 0xc4, 0x47, 0x38, 0xe4,
     0xfd, 0x15, 0x0c, 0x3c, 0x4a, 0x65, 0x79, 0x65, 0x4b, 0x95, 0x24, 0x2f, 0x87, 0xad, 0x53, 0xc6,
-    0x1d, 0xf5, 0x5a, 0xad, 0x00
+    0x2d, 0x15, 0x40, 0x33, 0x62, 0x00
 };
-inline bool frame_86_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_90_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Limits message{};
   decode(header, head);
@@ -2012,24 +2085,25 @@ inline bool frame_86_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pair_sum_max_ticks[0] == -7112 && message.pair_sum_max_ticks[1] == 5629 &&
   message.pair_difference_min_ticks[0] == 15372 && message.pair_difference_min_ticks[1] == 25930 &&
   message.pair_difference_max_ticks[0] == 25977 && message.pair_difference_max_ticks[1] == -27317
-  && message.coarse_threshold_raw == 2911317796u && message.hold_timeout_s == 50771u;
+  && message.coarse_threshold_raw == 2911317796u && message.hold_timeout_s == 50771u &&
+  message.stop_switch == 45;
 }
 // limits_random_2
-const uint8_t frame_87_header[] = {
+const uint8_t frame_91_header[] = {
     0x88, 0x4d, 0x71, 0x1b, 0xd3, 0xff, 0x02
 };
-const uint8_t frame_87_payload[] = {
+const uint8_t frame_91_payload[] = {
     0x7e, 0xb4, 0x82, 0x1a, 0xec, 0x02, 0xec, 0x23, 0xbf, 0xd3, 0x34, 0x4b, 0xc4, 0xea, 0x0b, 0x0a,
     0x32, 0x5e, 0x52, 0x2e, 0x2a, 0xd2, 0xad, 0x4f, 0xe9, 0xeb, 0x27, 0x42, 0x77, 0xae, 0x8e, 0xbc,
-    0x65, 0x3a, 0x97, 0x62, 0x8d, 0xfc, 0x18, 0x16
+    0x65, 0x3a, 0x97, 0x62, 0x8d, 0xfc, 0x18, 0x16, 0xdd
 };
-const uint8_t frame_87_wire[] = {
-    0x34, 0x88, 0x4d, 0x71, 0x1b, 0xd3, 0xff, 0x02, 0x7e, 0xb4, 0x82, 0x1a, 0xec, 0x02, 0xec, 0x23,
+const uint8_t frame_91_wire[] = {
+    0x35, 0x88, 0x4d, 0x71, 0x1b, 0xd3, 0xff, 0x02, 0x7e, 0xb4, 0x82, 0x1a, 0xec, 0x02, 0xec, 0x23,
     0xbf, 0xd3, 0x34, 0x4b, 0xc4, 0xea, 0x0b, 0x0a, 0x32, 0x5e, 0x52, 0x2e, 0x2a, 0xd2, 0xad, 0x4f,
     0xe9, 0xeb, 0x27, 0x42, 0x77, 0xae, 0x8e, 0xbc, 0x65, 0x3a, 0x97, 0x62, 0x8d, 0xfc, 0x18, 0x16,
-    0xf7, 0xb6, 0x54, 0x03, 0x00
+    0xdd, 0x01, 0xa1, 0x21, 0x19, 0x00
 };
-inline bool frame_87_fields_match(const uint8_t* header, const uint8_t* payload) {
+inline bool frame_91_fields_match(const uint8_t* header, const uint8_t* payload) {
   protocol::BoardHeader head{};
   protocol::Limits message{};
   decode(header, head);
@@ -2044,7 +2118,96 @@ inline bool frame_87_fields_match(const uint8_t* header, const uint8_t* payload)
   message.pair_sum_max_ticks[0] == 20397 && message.pair_sum_max_ticks[1] == -5143 &&
   message.pair_difference_min_ticks[0] == 16935 && message.pair_difference_min_ticks[1] == -20873
   && message.pair_difference_max_ticks[0] == -17266 && message.pair_difference_max_ticks[1] ==
-  14949 && message.coarse_threshold_raw == 4237124247u && message.hold_timeout_s == 5656;
+  14949 && message.coarse_threshold_raw == 4237124247u && message.hold_timeout_s == 5656 &&
+  message.stop_switch == 221;
+}
+// status_lowest
+const uint8_t frame_92_header[] = {
+    0x89, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
+};
+const uint8_t frame_92_payload[] = {
+    0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00
+};
+const uint8_t frame_92_wire[] = {
+    0x02, 0x89, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
+    0x01, 0x01, 0x01, 0x05, 0xda, 0x53, 0x6d, 0x52, 0x00
+};
+inline bool frame_92_fields_match(const uint8_t* header, const uint8_t* payload) {
+  protocol::BoardHeader head{};
+  protocol::Status message{};
+  decode(header, head);
+  decode(payload, message);
+  return head.type == 137 && head.session == 0 && head.sequence == 0 && head.expected == 0 &&
+  head.credit == 0 && head.epoch == 0 && head.state == 0 && message.supply_mv == 0 &&
+  message.stored_crc == 0 && message.storing == 0 && message.stop_switch_open == 0 &&
+  message.rx_framing_errors == 0 && message.rx_overruns == 0 && message.rx_overflows == 0 &&
+  message.late_pulses == 0;
+}
+// status_highest
+const uint8_t frame_93_header[] = {
+    0x89, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03
+};
+const uint8_t frame_93_payload[] = {
+    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff
+};
+const uint8_t frame_93_wire[] = {
+    0x18, 0x89, 0xff, 0xff, 0xff, 0xff, 0xff, 0x03, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
+    0xff, 0xff, 0xff, 0xff, 0xa0, 0xbe, 0xa2, 0x06, 0x00
+};
+inline bool frame_93_fields_match(const uint8_t* header, const uint8_t* payload) {
+  protocol::BoardHeader head{};
+  protocol::Status message{};
+  decode(header, head);
+  decode(payload, message);
+  return head.type == 137 && head.session == 255 && head.sequence == 255 && head.expected == 255 &&
+  head.credit == 255 && head.epoch == 255 && head.state == 3 && message.supply_mv == 65535u &&
+  message.stored_crc == 4294967295u && message.storing == 255 && message.stop_switch_open == 255 &&
+  message.rx_framing_errors == 255 && message.rx_overruns == 255 && message.rx_overflows == 255 &&
+  message.late_pulses == 255;
+}
+// status_random_1
+const uint8_t frame_94_header[] = {
+    0x89, 0x46, 0xaf, 0x8d, 0xdf, 0x32, 0x04
+};
+const uint8_t frame_94_payload[] = {
+    0x77, 0x32, 0x89, 0x9c, 0xd1, 0x77, 0xeb, 0xf8, 0xde, 0xef, 0xd2, 0xbf
+};
+const uint8_t frame_94_wire[] = {
+    0x18, 0x89, 0x46, 0xaf, 0x8d, 0xdf, 0x32, 0x04, 0x77, 0x32, 0x89, 0x9c, 0xd1, 0x77, 0xeb, 0xf8,
+    0xde, 0xef, 0xd2, 0xbf, 0xd0, 0x66, 0x36, 0xad, 0x00
+};
+inline bool frame_94_fields_match(const uint8_t* header, const uint8_t* payload) {
+  protocol::BoardHeader head{};
+  protocol::Status message{};
+  decode(header, head);
+  decode(payload, message);
+  return head.type == 137 && head.session == 70 && head.sequence == 175 && head.expected == 141 &&
+  head.credit == 223 && head.epoch == 50 && head.state == 4 && message.supply_mv == 12919 &&
+  message.stored_crc == 2010225801u && message.storing == 235 && message.stop_switch_open == 248 &&
+  message.rx_framing_errors == 222 && message.rx_overruns == 239 && message.rx_overflows == 210 &&
+  message.late_pulses == 191;
+}
+// status_random_2
+const uint8_t frame_95_header[] = {
+    0x89, 0x9d, 0xf8, 0x05, 0x49, 0xfe, 0x01
+};
+const uint8_t frame_95_payload[] = {
+    0xb3, 0xec, 0x0b, 0x36, 0xe1, 0x12, 0x1a, 0xb1, 0xa9, 0x44, 0x38, 0x42
+};
+const uint8_t frame_95_wire[] = {
+    0x18, 0x89, 0x9d, 0xf8, 0x05, 0x49, 0xfe, 0x01, 0xb3, 0xec, 0x0b, 0x36, 0xe1, 0x12, 0x1a, 0xb1,
+    0xa9, 0x44, 0x38, 0x42, 0x92, 0x04, 0x58, 0x30, 0x00
+};
+inline bool frame_95_fields_match(const uint8_t* header, const uint8_t* payload) {
+  protocol::BoardHeader head{};
+  protocol::Status message{};
+  decode(header, head);
+  decode(payload, message);
+  return head.type == 137 && head.session == 157 && head.sequence == 248 && head.expected == 5 &&
+  head.credit == 73 && head.epoch == 254 && head.state == 1 && message.supply_mv == 60595u &&
+  message.stored_crc == 316749323u && message.storing == 26 && message.stop_switch_open == 177 &&
+  message.rx_framing_errors == 169 && message.rx_overruns == 68 && message.rx_overflows == 56 &&
+  message.late_pulses == 66;
 }
 const uint8_t damaged_0[] = {
     0x05, 0x01, 0x02, 0x00
@@ -2584,134 +2747,166 @@ const Frame kFrames[] = {
         sizeof(detail::frame_55_header), detail::frame_55_payload,
         sizeof(detail::frame_55_payload), detail::frame_55_wire, sizeof(detail::frame_55_wire),
         detail::frame_55_fields_match, detail::reencode<protocol::SetLimits>},
-    {"hello_reply_lowest", false, protocol::MessageType::kHelloReply, detail::frame_56_header,
+    {"store_limits_lowest", true, protocol::MessageType::kStoreLimits, detail::frame_56_header,
         sizeof(detail::frame_56_header), detail::frame_56_payload,
         sizeof(detail::frame_56_payload), detail::frame_56_wire, sizeof(detail::frame_56_wire),
-        detail::frame_56_fields_match, detail::reencode<protocol::HelloReply>},
-    {"hello_reply_highest", false, protocol::MessageType::kHelloReply, detail::frame_57_header,
-        sizeof(detail::frame_57_header), detail::frame_57_payload,
+        detail::frame_56_fields_match, detail::reencode<protocol::StoreLimits>},
+    {"store_limits_highest", true, protocol::MessageType::kStoreLimits,
+        detail::frame_57_header, sizeof(detail::frame_57_header), detail::frame_57_payload,
         sizeof(detail::frame_57_payload), detail::frame_57_wire, sizeof(detail::frame_57_wire),
-        detail::frame_57_fields_match, detail::reencode<protocol::HelloReply>},
-    {"hello_reply_random_1", false, protocol::MessageType::kHelloReply,
+        detail::frame_57_fields_match, detail::reencode<protocol::StoreLimits>},
+    {"store_limits_random_1", true, protocol::MessageType::kStoreLimits,
         detail::frame_58_header, sizeof(detail::frame_58_header), detail::frame_58_payload,
         sizeof(detail::frame_58_payload), detail::frame_58_wire, sizeof(detail::frame_58_wire),
-        detail::frame_58_fields_match, detail::reencode<protocol::HelloReply>},
-    {"hello_reply_random_2", false, protocol::MessageType::kHelloReply,
+        detail::frame_58_fields_match, detail::reencode<protocol::StoreLimits>},
+    {"store_limits_random_2", true, protocol::MessageType::kStoreLimits,
         detail::frame_59_header, sizeof(detail::frame_59_header), detail::frame_59_payload,
         sizeof(detail::frame_59_payload), detail::frame_59_wire, sizeof(detail::frame_59_wire),
-        detail::frame_59_fields_match, detail::reencode<protocol::HelloReply>},
-    {"receipt_lowest", false, protocol::MessageType::kReceipt, detail::frame_60_header,
+        detail::frame_59_fields_match, detail::reencode<protocol::StoreLimits>},
+    {"hello_reply_lowest", false, protocol::MessageType::kHelloReply, detail::frame_60_header,
         sizeof(detail::frame_60_header), detail::frame_60_payload,
         sizeof(detail::frame_60_payload), detail::frame_60_wire, sizeof(detail::frame_60_wire),
-        detail::frame_60_fields_match, detail::reencode<protocol::Receipt>},
-    {"receipt_highest", false, protocol::MessageType::kReceipt, detail::frame_61_header,
+        detail::frame_60_fields_match, detail::reencode<protocol::HelloReply>},
+    {"hello_reply_highest", false, protocol::MessageType::kHelloReply, detail::frame_61_header,
         sizeof(detail::frame_61_header), detail::frame_61_payload,
         sizeof(detail::frame_61_payload), detail::frame_61_wire, sizeof(detail::frame_61_wire),
-        detail::frame_61_fields_match, detail::reencode<protocol::Receipt>},
-    {"receipt_random_1", false, protocol::MessageType::kReceipt, detail::frame_62_header,
-        sizeof(detail::frame_62_header), detail::frame_62_payload,
+        detail::frame_61_fields_match, detail::reencode<protocol::HelloReply>},
+    {"hello_reply_random_1", false, protocol::MessageType::kHelloReply,
+        detail::frame_62_header, sizeof(detail::frame_62_header), detail::frame_62_payload,
         sizeof(detail::frame_62_payload), detail::frame_62_wire, sizeof(detail::frame_62_wire),
-        detail::frame_62_fields_match, detail::reencode<protocol::Receipt>},
-    {"receipt_random_2", false, protocol::MessageType::kReceipt, detail::frame_63_header,
-        sizeof(detail::frame_63_header), detail::frame_63_payload,
+        detail::frame_62_fields_match, detail::reencode<protocol::HelloReply>},
+    {"hello_reply_random_2", false, protocol::MessageType::kHelloReply,
+        detail::frame_63_header, sizeof(detail::frame_63_header), detail::frame_63_payload,
         sizeof(detail::frame_63_payload), detail::frame_63_wire, sizeof(detail::frame_63_wire),
-        detail::frame_63_fields_match, detail::reencode<protocol::Receipt>},
-    {"pong_lowest", false, protocol::MessageType::kPong, detail::frame_64_header,
+        detail::frame_63_fields_match, detail::reencode<protocol::HelloReply>},
+    {"receipt_lowest", false, protocol::MessageType::kReceipt, detail::frame_64_header,
         sizeof(detail::frame_64_header), detail::frame_64_payload,
         sizeof(detail::frame_64_payload), detail::frame_64_wire, sizeof(detail::frame_64_wire),
-        detail::frame_64_fields_match, detail::reencode<protocol::Pong>},
-    {"pong_highest", false, protocol::MessageType::kPong, detail::frame_65_header,
+        detail::frame_64_fields_match, detail::reencode<protocol::Receipt>},
+    {"receipt_highest", false, protocol::MessageType::kReceipt, detail::frame_65_header,
         sizeof(detail::frame_65_header), detail::frame_65_payload,
         sizeof(detail::frame_65_payload), detail::frame_65_wire, sizeof(detail::frame_65_wire),
-        detail::frame_65_fields_match, detail::reencode<protocol::Pong>},
-    {"pong_random_1", false, protocol::MessageType::kPong, detail::frame_66_header,
+        detail::frame_65_fields_match, detail::reencode<protocol::Receipt>},
+    {"receipt_random_1", false, protocol::MessageType::kReceipt, detail::frame_66_header,
         sizeof(detail::frame_66_header), detail::frame_66_payload,
         sizeof(detail::frame_66_payload), detail::frame_66_wire, sizeof(detail::frame_66_wire),
-        detail::frame_66_fields_match, detail::reencode<protocol::Pong>},
-    {"pong_random_2", false, protocol::MessageType::kPong, detail::frame_67_header,
+        detail::frame_66_fields_match, detail::reencode<protocol::Receipt>},
+    {"receipt_random_2", false, protocol::MessageType::kReceipt, detail::frame_67_header,
         sizeof(detail::frame_67_header), detail::frame_67_payload,
         sizeof(detail::frame_67_payload), detail::frame_67_wire, sizeof(detail::frame_67_wire),
-        detail::frame_67_fields_match, detail::reencode<protocol::Pong>},
-    {"telemetry_lowest", false, protocol::MessageType::kTelemetry, detail::frame_68_header,
+        detail::frame_67_fields_match, detail::reencode<protocol::Receipt>},
+    {"pong_lowest", false, protocol::MessageType::kPong, detail::frame_68_header,
         sizeof(detail::frame_68_header), detail::frame_68_payload,
         sizeof(detail::frame_68_payload), detail::frame_68_wire, sizeof(detail::frame_68_wire),
-        detail::frame_68_fields_match, detail::reencode<protocol::Telemetry>},
-    {"telemetry_highest", false, protocol::MessageType::kTelemetry, detail::frame_69_header,
+        detail::frame_68_fields_match, detail::reencode<protocol::Pong>},
+    {"pong_highest", false, protocol::MessageType::kPong, detail::frame_69_header,
         sizeof(detail::frame_69_header), detail::frame_69_payload,
         sizeof(detail::frame_69_payload), detail::frame_69_wire, sizeof(detail::frame_69_wire),
-        detail::frame_69_fields_match, detail::reencode<protocol::Telemetry>},
-    {"telemetry_random_1", false, protocol::MessageType::kTelemetry, detail::frame_70_header,
+        detail::frame_69_fields_match, detail::reencode<protocol::Pong>},
+    {"pong_random_1", false, protocol::MessageType::kPong, detail::frame_70_header,
         sizeof(detail::frame_70_header), detail::frame_70_payload,
         sizeof(detail::frame_70_payload), detail::frame_70_wire, sizeof(detail::frame_70_wire),
-        detail::frame_70_fields_match, detail::reencode<protocol::Telemetry>},
-    {"telemetry_random_2", false, protocol::MessageType::kTelemetry, detail::frame_71_header,
+        detail::frame_70_fields_match, detail::reencode<protocol::Pong>},
+    {"pong_random_2", false, protocol::MessageType::kPong, detail::frame_71_header,
         sizeof(detail::frame_71_header), detail::frame_71_payload,
         sizeof(detail::frame_71_payload), detail::frame_71_wire, sizeof(detail::frame_71_wire),
-        detail::frame_71_fields_match, detail::reencode<protocol::Telemetry>},
-    {"trip_lowest", false, protocol::MessageType::kTrip, detail::frame_72_header,
+        detail::frame_71_fields_match, detail::reencode<protocol::Pong>},
+    {"telemetry_lowest", false, protocol::MessageType::kTelemetry, detail::frame_72_header,
         sizeof(detail::frame_72_header), detail::frame_72_payload,
         sizeof(detail::frame_72_payload), detail::frame_72_wire, sizeof(detail::frame_72_wire),
-        detail::frame_72_fields_match, detail::reencode<protocol::Trip>},
-    {"trip_highest", false, protocol::MessageType::kTrip, detail::frame_73_header,
+        detail::frame_72_fields_match, detail::reencode<protocol::Telemetry>},
+    {"telemetry_highest", false, protocol::MessageType::kTelemetry, detail::frame_73_header,
         sizeof(detail::frame_73_header), detail::frame_73_payload,
         sizeof(detail::frame_73_payload), detail::frame_73_wire, sizeof(detail::frame_73_wire),
-        detail::frame_73_fields_match, detail::reencode<protocol::Trip>},
-    {"trip_random_1", false, protocol::MessageType::kTrip, detail::frame_74_header,
+        detail::frame_73_fields_match, detail::reencode<protocol::Telemetry>},
+    {"telemetry_random_1", false, protocol::MessageType::kTelemetry, detail::frame_74_header,
         sizeof(detail::frame_74_header), detail::frame_74_payload,
         sizeof(detail::frame_74_payload), detail::frame_74_wire, sizeof(detail::frame_74_wire),
-        detail::frame_74_fields_match, detail::reencode<protocol::Trip>},
-    {"trip_random_2", false, protocol::MessageType::kTrip, detail::frame_75_header,
+        detail::frame_74_fields_match, detail::reencode<protocol::Telemetry>},
+    {"telemetry_random_2", false, protocol::MessageType::kTelemetry, detail::frame_75_header,
         sizeof(detail::frame_75_header), detail::frame_75_payload,
         sizeof(detail::frame_75_payload), detail::frame_75_wire, sizeof(detail::frame_75_wire),
-        detail::frame_75_fields_match, detail::reencode<protocol::Trip>},
-    {"fault_lowest", false, protocol::MessageType::kFault, detail::frame_76_header,
+        detail::frame_75_fields_match, detail::reencode<protocol::Telemetry>},
+    {"trip_lowest", false, protocol::MessageType::kTrip, detail::frame_76_header,
         sizeof(detail::frame_76_header), detail::frame_76_payload,
         sizeof(detail::frame_76_payload), detail::frame_76_wire, sizeof(detail::frame_76_wire),
-        detail::frame_76_fields_match, detail::reencode<protocol::FaultMessage>},
-    {"fault_highest", false, protocol::MessageType::kFault, detail::frame_77_header,
+        detail::frame_76_fields_match, detail::reencode<protocol::Trip>},
+    {"trip_highest", false, protocol::MessageType::kTrip, detail::frame_77_header,
         sizeof(detail::frame_77_header), detail::frame_77_payload,
         sizeof(detail::frame_77_payload), detail::frame_77_wire, sizeof(detail::frame_77_wire),
-        detail::frame_77_fields_match, detail::reencode<protocol::FaultMessage>},
-    {"fault_random_1", false, protocol::MessageType::kFault, detail::frame_78_header,
+        detail::frame_77_fields_match, detail::reencode<protocol::Trip>},
+    {"trip_random_1", false, protocol::MessageType::kTrip, detail::frame_78_header,
         sizeof(detail::frame_78_header), detail::frame_78_payload,
         sizeof(detail::frame_78_payload), detail::frame_78_wire, sizeof(detail::frame_78_wire),
-        detail::frame_78_fields_match, detail::reencode<protocol::FaultMessage>},
-    {"fault_random_2", false, protocol::MessageType::kFault, detail::frame_79_header,
+        detail::frame_78_fields_match, detail::reencode<protocol::Trip>},
+    {"trip_random_2", false, protocol::MessageType::kTrip, detail::frame_79_header,
         sizeof(detail::frame_79_header), detail::frame_79_payload,
         sizeof(detail::frame_79_payload), detail::frame_79_wire, sizeof(detail::frame_79_wire),
-        detail::frame_79_fields_match, detail::reencode<protocol::FaultMessage>},
-    {"refusal_lowest", false, protocol::MessageType::kRefusal, detail::frame_80_header,
+        detail::frame_79_fields_match, detail::reencode<protocol::Trip>},
+    {"fault_lowest", false, protocol::MessageType::kFault, detail::frame_80_header,
         sizeof(detail::frame_80_header), detail::frame_80_payload,
         sizeof(detail::frame_80_payload), detail::frame_80_wire, sizeof(detail::frame_80_wire),
-        detail::frame_80_fields_match, detail::reencode<protocol::RefusalMessage>},
-    {"refusal_highest", false, protocol::MessageType::kRefusal, detail::frame_81_header,
+        detail::frame_80_fields_match, detail::reencode<protocol::FaultMessage>},
+    {"fault_highest", false, protocol::MessageType::kFault, detail::frame_81_header,
         sizeof(detail::frame_81_header), detail::frame_81_payload,
         sizeof(detail::frame_81_payload), detail::frame_81_wire, sizeof(detail::frame_81_wire),
-        detail::frame_81_fields_match, detail::reencode<protocol::RefusalMessage>},
-    {"refusal_random_1", false, protocol::MessageType::kRefusal, detail::frame_82_header,
+        detail::frame_81_fields_match, detail::reencode<protocol::FaultMessage>},
+    {"fault_random_1", false, protocol::MessageType::kFault, detail::frame_82_header,
         sizeof(detail::frame_82_header), detail::frame_82_payload,
         sizeof(detail::frame_82_payload), detail::frame_82_wire, sizeof(detail::frame_82_wire),
-        detail::frame_82_fields_match, detail::reencode<protocol::RefusalMessage>},
-    {"refusal_random_2", false, protocol::MessageType::kRefusal, detail::frame_83_header,
+        detail::frame_82_fields_match, detail::reencode<protocol::FaultMessage>},
+    {"fault_random_2", false, protocol::MessageType::kFault, detail::frame_83_header,
         sizeof(detail::frame_83_header), detail::frame_83_payload,
         sizeof(detail::frame_83_payload), detail::frame_83_wire, sizeof(detail::frame_83_wire),
-        detail::frame_83_fields_match, detail::reencode<protocol::RefusalMessage>},
-    {"limits_lowest", false, protocol::MessageType::kLimits, detail::frame_84_header,
+        detail::frame_83_fields_match, detail::reencode<protocol::FaultMessage>},
+    {"refusal_lowest", false, protocol::MessageType::kRefusal, detail::frame_84_header,
         sizeof(detail::frame_84_header), detail::frame_84_payload,
         sizeof(detail::frame_84_payload), detail::frame_84_wire, sizeof(detail::frame_84_wire),
-        detail::frame_84_fields_match, detail::reencode<protocol::Limits>},
-    {"limits_highest", false, protocol::MessageType::kLimits, detail::frame_85_header,
+        detail::frame_84_fields_match, detail::reencode<protocol::RefusalMessage>},
+    {"refusal_highest", false, protocol::MessageType::kRefusal, detail::frame_85_header,
         sizeof(detail::frame_85_header), detail::frame_85_payload,
         sizeof(detail::frame_85_payload), detail::frame_85_wire, sizeof(detail::frame_85_wire),
-        detail::frame_85_fields_match, detail::reencode<protocol::Limits>},
-    {"limits_random_1", false, protocol::MessageType::kLimits, detail::frame_86_header,
+        detail::frame_85_fields_match, detail::reencode<protocol::RefusalMessage>},
+    {"refusal_random_1", false, protocol::MessageType::kRefusal, detail::frame_86_header,
         sizeof(detail::frame_86_header), detail::frame_86_payload,
         sizeof(detail::frame_86_payload), detail::frame_86_wire, sizeof(detail::frame_86_wire),
-        detail::frame_86_fields_match, detail::reencode<protocol::Limits>},
-    {"limits_random_2", false, protocol::MessageType::kLimits, detail::frame_87_header,
+        detail::frame_86_fields_match, detail::reencode<protocol::RefusalMessage>},
+    {"refusal_random_2", false, protocol::MessageType::kRefusal, detail::frame_87_header,
         sizeof(detail::frame_87_header), detail::frame_87_payload,
         sizeof(detail::frame_87_payload), detail::frame_87_wire, sizeof(detail::frame_87_wire),
-        detail::frame_87_fields_match, detail::reencode<protocol::Limits>},
+        detail::frame_87_fields_match, detail::reencode<protocol::RefusalMessage>},
+    {"limits_lowest", false, protocol::MessageType::kLimits, detail::frame_88_header,
+        sizeof(detail::frame_88_header), detail::frame_88_payload,
+        sizeof(detail::frame_88_payload), detail::frame_88_wire, sizeof(detail::frame_88_wire),
+        detail::frame_88_fields_match, detail::reencode<protocol::Limits>},
+    {"limits_highest", false, protocol::MessageType::kLimits, detail::frame_89_header,
+        sizeof(detail::frame_89_header), detail::frame_89_payload,
+        sizeof(detail::frame_89_payload), detail::frame_89_wire, sizeof(detail::frame_89_wire),
+        detail::frame_89_fields_match, detail::reencode<protocol::Limits>},
+    {"limits_random_1", false, protocol::MessageType::kLimits, detail::frame_90_header,
+        sizeof(detail::frame_90_header), detail::frame_90_payload,
+        sizeof(detail::frame_90_payload), detail::frame_90_wire, sizeof(detail::frame_90_wire),
+        detail::frame_90_fields_match, detail::reencode<protocol::Limits>},
+    {"limits_random_2", false, protocol::MessageType::kLimits, detail::frame_91_header,
+        sizeof(detail::frame_91_header), detail::frame_91_payload,
+        sizeof(detail::frame_91_payload), detail::frame_91_wire, sizeof(detail::frame_91_wire),
+        detail::frame_91_fields_match, detail::reencode<protocol::Limits>},
+    {"status_lowest", false, protocol::MessageType::kStatus, detail::frame_92_header,
+        sizeof(detail::frame_92_header), detail::frame_92_payload,
+        sizeof(detail::frame_92_payload), detail::frame_92_wire, sizeof(detail::frame_92_wire),
+        detail::frame_92_fields_match, detail::reencode<protocol::Status>},
+    {"status_highest", false, protocol::MessageType::kStatus, detail::frame_93_header,
+        sizeof(detail::frame_93_header), detail::frame_93_payload,
+        sizeof(detail::frame_93_payload), detail::frame_93_wire, sizeof(detail::frame_93_wire),
+        detail::frame_93_fields_match, detail::reencode<protocol::Status>},
+    {"status_random_1", false, protocol::MessageType::kStatus, detail::frame_94_header,
+        sizeof(detail::frame_94_header), detail::frame_94_payload,
+        sizeof(detail::frame_94_payload), detail::frame_94_wire, sizeof(detail::frame_94_wire),
+        detail::frame_94_fields_match, detail::reencode<protocol::Status>},
+    {"status_random_2", false, protocol::MessageType::kStatus, detail::frame_95_header,
+        sizeof(detail::frame_95_header), detail::frame_95_payload,
+        sizeof(detail::frame_95_payload), detail::frame_95_wire, sizeof(detail::frame_95_wire),
+        detail::frame_95_fields_match, detail::reencode<protocol::Status>},
 };
 
 const Damaged kDamaged[] = {

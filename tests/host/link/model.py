@@ -146,6 +146,7 @@ class ModelBoard:
             lambda i: FaultMessage(
                 record_id=i,
                 session=0,
+                further=0,
                 fault=fault,
                 detail=0,
                 frame=self.frame,
@@ -253,7 +254,7 @@ LIMITS = Limits(
     pulse_min_ticks=(1660, 1660, 1660, 1660), pulse_max_ticks=(4300, 4300, 4300, 4300),
     slew_ticks=140, pair_sum_min_ticks=(3000, 3000), pair_sum_max_ticks=(8000, 8000),
     pair_difference_min_ticks=(-900, -900), pair_difference_max_ticks=(900, 900),
-    coarse_threshold_raw=200_000, hold_timeout_s=0,
+    coarse_threshold_raw=200_000, hold_timeout_s=0, stop_switch=0,
 )  # fmt: skip
 
 

@@ -26,8 +26,12 @@ void Board::poll() {
   } else {
     now_ = now;
   }
+  watch_stop_switch();
   receive();
   read_sensor();
+  // Only at rest: a servo's current may pull the supply down in the middle of a byte.
+  if (mode_ == Mode::kRelaxed && store_.step(limits_.in_force()))
+    status_wanted_ = true;
   report();
 }
 
@@ -36,16 +40,19 @@ void Board::start() {
   now_ = hal_.now();
   idle_since_frame_ = now_.frame;
   sampled_frame_ = now_.frame;
-  const Retained& retained = hal_.retained();
-  if (retained.pose_known)
-    current_ = retained.pulses;
+  Retained& retained = hal_.retained();
+  trip_.begin(retained.trip);
+  fault_.begin(retained.fault);
+  refusal_.begin(retained.refusal);
+  if (!retained.pose.whole())
+    retained.pose = retained.pose_copy;
+  if (!retained.pose.whole())
+    retained.pose.clear();
+  if (retained.pose.value.known)
+    current_ = retained.pose.value.pulses;
   next_ = current_;
   history_.fill(current_);
-
-  protocol::SetLimits initial;
-  protocol::flash_copy(&kInitialLimits, initial);
-  if (!limits_.set(initial).ok())
-    fault(protocol::Fault::kInternal, 0);
+  start_limits();
 
   switch (hal_.reset_cause()) {
     case protocol::ResetCause::kWatchdog:
@@ -59,9 +66,20 @@ void Board::start() {
   }
 }
 
+void Board::start_limits() {
+  protocol::SetLimits limits;
+  // What an older firmware took may be out of this one's bounds.
+  if (store_.load(limits) && limits_.set(limits).ok())
+    return;
+  protocol::flash_copy(&kInitialLimits, limits);
+  if (!limits_.set(limits).ok())
+    fault(protocol::Fault::kInternal, 0);
+}
+
 void Board::begin_frame(const BoardTime& now) {
   latch_frame(now);
   check_consistency();
+  watch_supply();
   if (detector_.deadline_passed())
     trip(protocol::TripCause::kDeadline);
   watch_hold_timeout();
@@ -75,17 +93,22 @@ void Board::latch_frame(const BoardTime& now) {
   current_attached_ = attached_;
   history_.add(current_);
   Retained& retained = hal_.retained();
+  Pose& pose = retained.pose.value;
   for (uint8_t i = 0; i < protocol::kServos; ++i) {
     if ((current_attached_ >> i) & 1)
-      retained.pulses.ticks[i] = current_.ticks[i];
+      pose.pulses.ticks[i] = current_.ticks[i];
   }
   if (current_attached_ == kAllServos)
-    retained.pose_known = true;
+    pose.known = true;
+  retained.pose.seal();
+  retained.pose_copy = retained.pose;
 
   trip_.on_frame();
   fault_.on_frame();
   refusal_.on_frame();
   telemetry_wanted_ = session_.open();
+  if (++status_age_frames_ >= protocol::kStatusFrames)
+    status_wanted_ = true;
 }
 
 // From the pulses of this frame to those of the next.

@@ -10,10 +10,12 @@
 
 #include <stdint.h>
 
+#include "board/limits_store.h"
 #include "board/pulse_history.h"
 #include "board/sample_log.h"
 #include "board/state_table.h"
 #include "contact/detector.h"
+#include "contact/sample_judge.h"
 #include "hal/hal.h"
 #include "link/latch.h"
 #include "link/receiver.h"
@@ -38,7 +40,7 @@ namespace setae {
 class Board {
  public:
   // Touches no hardware: that begins with the first poll().
-  explicit Board(Hal& hal) : hal_(hal), transmitter_(hal) {}
+  explicit Board(Hal& hal) : hal_(hal), transmitter_(hal), store_(hal) {}
 
   void poll();
 
@@ -50,6 +52,7 @@ class Board {
 
   // ---- board.cpp: time ----
   SETAE_OWN_FRAME void start();
+  SETAE_OWN_FRAME void start_limits();
   SETAE_OWN_FRAME void begin_frame(const BoardTime& now);
   void advance_motion();
   void watch_hold_timeout();
@@ -89,6 +92,7 @@ class Board {
   SETAE_OWN_FRAME Verdict guard();
   Verdict disarm();
   SETAE_OWN_FRAME Verdict set_limits();
+  Verdict store_limits();
   Verdict check_segments(const protocol::Segments& message) const;
   Verdict check_guard(const protocol::GuardMessage& message) const;
   // Latches the refusal, and stops the motion where a motion was refused.
@@ -99,9 +103,16 @@ class Board {
   void take_sample(const SensorReading& reading);
   RestLevel::Follow rest_follow() const;
   void refuse_tare(protocol::Refusal reason, uint32_t value, uint32_t limit);
+  void watch_supply();
+  void watch_stop_switch();
+  bool stop_switch_open() const {
+    return limits_.in_force().stop_switch && hal_.stop_switch_open();
+  }
   SETAE_OWN_FRAME void trip(protocol::TripCause cause);
   SETAE_OWN_FRAME void fault(protocol::Fault fault, uint32_t detail);
-  bool sensor_fault_persists() const;
+  bool fault_persists() const;
+  // While one waits, no motion: so none that the host has not read is ever overwritten.
+  bool record_pending() const { return trip_.pending() || fault_.pending(); }
 
   // ---- reports.cpp: what the host gets to know ----
   void report();
@@ -109,6 +120,7 @@ class Board {
   SETAE_OWN_FRAME bool send_limits();
   SETAE_OWN_FRAME bool send_pong();
   SETAE_OWN_FRAME bool send_telemetry();
+  SETAE_OWN_FRAME bool send_status();
   template <typename Record>
   SETAE_OWN_FRAME bool send_latched(Latch<Record>& latch);
   protocol::BoardHeader header() const;
@@ -118,6 +130,7 @@ class Board {
   Session session_;
   Transmitter transmitter_;
   Limits limits_;
+  LimitsStore store_;
   Player player_;
   Attacher attacher_;
   Detector detector_;
@@ -147,10 +160,15 @@ class Board {
 
   // Sensor.
   protocol::Sensor sensor_ = protocol::Sensor::kAbsent;
-  bool out_of_range_ = false;  // the last sample was
-  BoardTime sampled_ = {};     // the last sample
+  SampleJudge judge_;
+  protocol::Sensor judged_ = protocol::Sensor::kOk;  // of the last sample's value
+  BoardTime sampled_ = {};                           // the last sample
   uint32_t sampled_frame_ = 0;
   SampleLog samples_;
+
+  // Supply and stop switch.
+  bool supply_low_ = false;
+  uint8_t open_polls_ = 0;
 
   // Link.
   bool stop_known_ = false;
@@ -164,6 +182,8 @@ class Board {
   bool pong_wanted_ = false;
   bool limits_wanted_ = false;
   bool telemetry_wanted_ = false;
+  bool status_wanted_ = false;
+  uint8_t status_age_frames_ = 0;
 
   Latch<protocol::Trip> trip_;
   Latch<protocol::FaultMessage> fault_;

@@ -108,6 +108,7 @@ void Board::handle_hello() {
   session_.start(hello.new_session);
   idle_since_frame_ = now_.frame;
   stop_known_ = false;
+  status_wanted_ = true;
   receipt_wanted_ = false;
   gap_ = false;
   if (mode_ == Mode::kPlaying || mode_ == Mode::kUnwinding) {
@@ -196,6 +197,8 @@ Verdict Board::decide() {
       return disarm();
     case MessageType::kSetLimits:
       return set_limits();
+    case MessageType::kStoreLimits:
+      return store_limits();
     default:
       return Verdict::refuse(Refusal::kBadField);
   }
@@ -205,6 +208,8 @@ Verdict Board::enable() {
   protocol::Enable message;
   decode(receiver_.payload(), message);
   Verdict verdict = ask(Event::kEnable);
+  if (verdict.ok() && record_pending())
+    verdict = Verdict::refuse(Refusal::kRecordPending);
   if (verdict.ok())
     verdict = limits_.check_pose(message.pulse_ticks);
   if (!verdict.ok())
@@ -228,12 +233,13 @@ Verdict Board::resume() {
   if (message.epoch != epoch_) {
     return Verdict::refuse(Refusal::kWrongEpoch, kNoIndex, message.epoch, epoch_);
   }
-  if ((mode_ == Mode::kTripped && trip_.pending()) || (mode_ == Mode::kFault && fault_.pending())) {
+  if (record_pending() && mode_ != Mode::kReflex)
     return Verdict::refuse(Refusal::kRecordPending);
-  }
-  if (mode_ == Mode::kFault && sensor_fault_persists()) {
+  if (mode_ == Mode::kFault && fault_persists()) {
     return Verdict::refuse(Refusal::kFault, kNoIndex, fault_.record().fault);
   }
+  if (stop_switch_open())
+    return Verdict::refuse(Refusal::kStopSwitch);
   const Mode before = mode_;
   const Verdict verdict = raise(attached_ == 0            ? Event::kResumeDetached
                                 : attached_ == kAllServos ? Event::kResumeAttached
@@ -323,8 +329,6 @@ Verdict Board::guard() {
     verdict = Verdict::refuse(Refusal::kBusy);
   if (verdict.ok())
     verdict = check_guard(message);
-  if (verdict.ok() && trip_.pending())
-    verdict = Verdict::refuse(Refusal::kRecordPending);
   if (verdict.ok() && sensor_ != protocol::Sensor::kOk) {
     verdict = Verdict::refuse(Refusal::kSensorUnavailable, kNoIndex, static_cast<uint8_t>(sensor_));
   }
@@ -372,8 +376,23 @@ Verdict Board::disarm() {
 Verdict Board::set_limits() {
   protocol::SetLimits message;
   decode(receiver_.payload(), message);
+  Verdict verdict = ask(Event::kSetLimits);
+  if (verdict.ok())
+    verdict = limits_.set(message);
+  if (verdict.ok())
+    store_.cancel();
+  return verdict;
+}
+
+Verdict Board::store_limits() {
   const Verdict verdict = ask(Event::kSetLimits);
-  return verdict.ok() ? limits_.set(message) : verdict;
+  if (!verdict.ok())
+    return verdict;
+  if (supply_low_)
+    return Verdict::refuse(Refusal::kSupplyLow, kNoIndex, supply_mv(hal_.bandgap_part()),
+                           kSupplyLowMv);
+  store_.start();
+  return verdict;
 }
 
 }  // namespace setae

@@ -17,6 +17,7 @@ constexpr protocol::SetLimits kDefaultLimits = {
     {985, 985},                // pair_difference_max_ticks
     245760,                    // coarse_threshold_raw
     0,                         // hold_timeout_s
+    0,                         // stop_switch
 };
 
 }  // namespace setae

@@ -9,13 +9,18 @@ namespace setae {
 
 // Nothing overtakes what finds no room: small answers to a host that asks without a break would
 // keep the line from ever having room for a record.
+// What the board sends by itself goes first, for the same reason: records and telemetry come at
+// their own pace, answers as fast as they are asked for.
 void Board::report() {
   if (!transmitter_.ready())
     return;
-  if (hello_wanted_) {
-    if (!send_hello_reply())
+  if (!send_latched(trip_) || !send_latched(fault_) || !send_latched(refusal_))
+    return;
+  const bool frame_began = telemetry_wanted_;
+  if (telemetry_wanted_) {
+    if (!send_telemetry())
       return;
-    hello_wanted_ = false;
+    telemetry_wanted_ = false;
   }
   if (receipt_wanted_) {
     const protocol::Receipt receipt = {gap_};
@@ -23,20 +28,26 @@ void Board::report() {
       return;
     receipt_wanted_ = gap_ = false;
   }
-  if (!send_latched(trip_) || !send_latched(fault_) || !send_latched(refusal_))
-    return;
+  if (hello_wanted_) {
+    if (!send_hello_reply())
+      return;
+    hello_wanted_ = false;
+  }
   if (pong_wanted_) {
     if (!send_pong())
       return;
     pong_wanted_ = false;
   }
-  if (telemetry_wanted_) {
-    if (!send_telemetry())
+  if (limits_wanted_) {
+    if (!send_limits())
       return;
-    telemetry_wanted_ = false;
-  }
-  if (limits_wanted_ && send_limits())
     limits_wanted_ = false;
+  }
+  // The poll in which a frame begins is the longest already.
+  if (status_wanted_ && !frame_began && session_.open() && send_status()) {
+    status_wanted_ = false;
+    status_age_frames_ = 0;
+  }
 }
 
 // False where it is wanted and the line has no room.
@@ -73,10 +84,10 @@ bool Board::send_hello_reply() {
   uint8_t limits[protocol::SetLimits::kSize];
   encode(limits_.in_force(), limits);
   reply.limits_crc = protocol::crc32c(limits, sizeof(limits));
-  reply.pose_known = hal_.retained().pose_known;
-  for (uint8_t i = 0; i < protocol::kServos; ++i) {
-    reply.pulse_ticks[i] = hal_.retained().pulses.ticks[i];
-  }
+  const Pose& pose = hal_.retained().pose.value;
+  reply.pose_known = pose.known;
+  for (uint8_t i = 0; i < protocol::kServos; ++i)
+    reply.pulse_ticks[i] = pose.pulses.ticks[i];
   reply.sensor = static_cast<uint8_t>(sensor_);
   return transmitter_.send(header(), reply);
 }
@@ -119,6 +130,20 @@ bool Board::send_telemetry() {
     return false;
   samples_.clear();
   return true;
+}
+
+bool Board::send_status() {
+  const LineErrors errors = hal_.line_errors();
+  protocol::Status status = {};
+  status.supply_mv = supply_mv(hal_.bandgap_part());
+  status.stored_crc = store_.crc();
+  status.storing = store_.storing();
+  status.stop_switch_open = hal_.stop_switch_open();
+  status.rx_framing_errors = errors.framing;
+  status.rx_overruns = errors.overrun;
+  status.rx_overflows = errors.dropped;
+  status.late_pulses = hal_.late_pulses();
+  return transmitter_.send(header(), status);
 }
 
 }  // namespace setae

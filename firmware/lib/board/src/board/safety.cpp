@@ -11,9 +11,8 @@ using protocol::TripCause;
 
 namespace {
 
-// LPS33HW, datasheet table 3: operating pressure range.
-constexpr int32_t kPressureMinRaw = 260L * protocol::kPressureLsbPerHpa;
-constexpr int32_t kPressureMaxRaw = 1260L * protocol::kPressureLsbPerHpa;
+// The stop switch's: 0.2 ms at least, which a servo's spark does not last.
+constexpr uint8_t kOpenPolls = 4;
 
 constexpr Fault fault_of(Sensor sensor) {
   return static_cast<Fault>(sensor);
@@ -23,19 +22,19 @@ static_assert(fault_of(Sensor::kWrong) == Fault::kSensorWrong, "");
 static_assert(fault_of(Sensor::kSilent) == Fault::kSensorSilent, "");
 static_assert(fault_of(Sensor::kBus) == Fault::kSensorBus, "");
 static_assert(fault_of(Sensor::kRange) == Fault::kSensorRange, "");
+static_assert(fault_of(Sensor::kStuck) == Fault::kSensorStuck, "");
+static_assert(fault_of(Sensor::kNoisy) == Fault::kSensorNoisy, "");
 
 }  // namespace
 
 void Board::read_sensor() {
   const SensorReading reading = hal_.read_sensor();
-  if (reading.fresh) {
-    out_of_range_ =
-        reading.pressure_raw < kPressureMinRaw || reading.pressure_raw > kPressureMaxRaw;
-  }
+  if (reading.fresh)
+    judged_ = judge_.take(reading.pressure_raw);
   if (reading.status != Sensor::kOk) {
     sensor_ = reading.status;
-  } else if (out_of_range_) {
-    sensor_ = Sensor::kRange;
+  } else if (judged_ != Sensor::kOk) {
+    sensor_ = judged_;
   } else if (now_.frame - sampled_frame_ > protocol::kSensorSilentFrames && !reading.fresh) {
     sensor_ = Sensor::kSilent;
   } else {
@@ -128,9 +127,34 @@ void Board::trip(TripCause cause) {
   trip_.set(record, session_.id());
 }
 
+void Board::watch_supply() {
+  const uint16_t part = hal_.bandgap_part();
+  const bool low = part > (supply_low_ ? kSupplyGoodPart : kSupplyLowPart);
+  if (low && !supply_low_)
+    fault(Fault::kSupplyLow, supply_mv(part));
+  supply_low_ = low;
+}
+
+void Board::watch_stop_switch() {
+  if (!stop_switch_open()) {
+    open_polls_ = 0;
+    return;
+  }
+  if (open_polls_ < kOpenPolls) {
+    ++open_polls_;
+    return;
+  }
+  if (mode_ == Mode::kStopped || mode_ == Mode::kFault)
+    return;
+  freeze();
+  raise(Event::kStop);
+}
+
 void Board::fault(Fault fault, uint32_t detail) {
   freeze();
   mode_ = look_up(mode_, Event::kFault).mode();
+  if (fault_.pending())
+    return fault_.count_further();
 
   protocol::FaultMessage record = {};
   record.fault = static_cast<uint8_t>(fault);
@@ -142,10 +166,10 @@ void Board::fault(Fault fault, uint32_t detail) {
   fault_.set(record, session_.id());
 }
 
-bool Board::sensor_fault_persists() const {
+bool Board::fault_persists() const {
   const Fault cause = static_cast<Fault>(fault_.record().fault);
-  const bool of_sensor = cause >= Fault::kSensorAbsent && cause <= Fault::kSensorRange;
-  return of_sensor && sensor_ != Sensor::kOk;
+  const bool of_sensor = cause >= Fault::kSensorAbsent && cause <= Fault::kSensorNoisy;
+  return supply_low_ || (of_sensor && sensor_ != Sensor::kOk);
 }
 
 }  // namespace setae

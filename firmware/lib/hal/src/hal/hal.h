@@ -4,7 +4,9 @@
 
 #include <stdint.h>
 
+#include "hal/retained.h"
 #include "hal/ring.h"
+#include "hal/supply.h"
 #include "protocol/messages.h"
 
 namespace setae {
@@ -13,10 +15,6 @@ namespace setae {
 struct BoardTime {
   uint32_t frame;
   uint16_t phase_us;
-};
-
-struct Pulses {
-  uint16_t ticks[protocol::kServos];  // 0.5 us each
 };
 
 // Status and value travel together: a value is never used where a read failed.
@@ -32,13 +30,6 @@ struct LineErrors {
   uint8_t framing;  // no stop bit: noise, or another rate
   uint8_t overrun;  // the handler came too late
   uint8_t dropped;  // the loop came too late: the ring was full
-};
-
-// Survives a reset, not a power cut. The HAL checks its CRC at start and clears
-// it where it is broken.
-struct Retained {
-  bool pose_known;
-  Pulses pulses;  // last pulses put out
 };
 
 class Hal {
@@ -59,12 +50,24 @@ class Hal {
   // Returns the frame that was running at that moment; a loop that looks at the time itself can
   // be overtaken by the next frame before it calls.
   virtual uint32_t set_pulses(const Pulses& pulses, uint8_t attached) = 0;
+  // Edges that were armed too late, modulo 256.
+  virtual uint8_t late_pulses() = 0;
 
   // Never waits longer than 1 ms.
   virtual SensorReading read_sensor() = 0;
 
   virtual protocol::ResetCause reset_cause() = 0;
   virtual Retained& retained() = 0;
+
+  // The bandgap in parts of the supply, see supply.h; 0 before it was measured.
+  virtual uint16_t bandgap_part() = 0;
+  // The normally closed switch; open, too, where there is none.
+  virtual bool stop_switch_open() = 0;
+
+  // A byte takes 3.4 ms to write. Neither reading nor writing is allowed before it is ready.
+  virtual bool eeprom_ready() = 0;
+  virtual uint8_t eeprom_read(uint16_t address) = 0;
+  virtual void eeprom_write(uint16_t address, uint8_t value) = 0;
 
  protected:
   ~Hal() = default;

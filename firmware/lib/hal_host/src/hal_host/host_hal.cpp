@@ -1,13 +1,29 @@
 #include "hal_host/host_hal.h"
 
+#include <string.h>
+
 namespace setae {
 
 constexpr uint16_t HostHal::kFreeTicks;
 
 HostHal::HostHal() {
-  retained_.pose_known = true;
-  for (uint16_t& ticks : retained_.pulses.ticks)
+  memset(eeprom_, 0xFF, sizeof(eeprom_));
+  forget_retained();
+  retained_.pose.clear();
+  retained_.pose.value.known = true;
+  for (uint16_t& ticks : retained_.pose.value.pulses.ticks)
     ticks = kFreeTicks;
+  retained_.pose.seal();
+}
+
+void HostHal::forget_retained() {
+  memset(&retained_, 0xA5, sizeof(retained_));
+}
+
+void HostHal::eeprom_write(uint16_t address, uint8_t value) {
+  eeprom_[address] = value;
+  ++eeprom_writes_;
+  eeprom_ready_us_ = board_us_ + kEepromWriteUs;
 }
 
 BoardTime HostHal::to_board_time(uint64_t time_us) {
@@ -26,7 +42,7 @@ void HostHal::advance_to(uint64_t board_us) {
 bool HostHal::push_rx(uint8_t byte) {
   if (receive_.push(byte))
     return true;
-  ++rx_overruns_;
+  ++errors_.dropped;
   return false;
 }
 
@@ -44,6 +60,9 @@ void HostHal::push_sample(protocol::Sensor status, int32_t pressure_raw, uint64_
 
 void HostHal::restart(protocol::ResetCause cause) {
   board_us_ = 0;
+  eeprom_ready_us_ = 0;
+  errors_ = {};
+  late_pulses_ = 0;
   receive_.clear();
   transmit_.clear();
   next_attached_ = 0;

@@ -28,7 +28,9 @@ class HostHal : public Hal {
   bool push_rx(uint8_t byte);
   // The next byte for the line.
   bool pop_tx(uint8_t& byte) { return transmit_.pop(byte); }
-  uint32_t rx_overruns() const { return rx_overruns_; }
+  // What the hardware would notice, for a test to set; push_rx() counts what it drops.
+  LineErrors& errors() { return errors_; }
+  uint8_t& late() { return late_pulses_; }
 
   // Status `ok`: a sample that was ready at `sampled_us` (not after now). Any
   // other status: the sensor fails like this until the next call.
@@ -41,7 +43,16 @@ class HostHal : public Hal {
   // The board starts anew at time 0: line, pulses and sensor are lost, retained
   // memory is not. The caller makes a new Board.
   void restart(protocol::ResetCause cause);
-  void forget_pose() { retained_.pose_known = false; }
+  // As after power-on: the retained memory holds anything. EEPROM stays.
+  void forget_retained();
+  void forget_pose() { retained_.pose.clear(); }
+
+  void set_supply_mv(uint16_t mv) { bandgap_part_ = supply_mv(mv); }
+  void set_stop_switch(bool open) { stop_switch_open_ = open; }
+
+  // How many bytes were written to EEPROM, and its content.
+  uint32_t eeprom_writes() const { return eeprom_writes_; }
+  uint8_t& eeprom(uint16_t address) { return eeprom_[address]; }
 
   // ---- Hal ----
 
@@ -49,14 +60,22 @@ class HostHal : public Hal {
   ReceiveRing& received() override { return receive_; }
   TransmitRing& to_send() override { return transmit_; }
   void start_sending() override {}
-  LineErrors line_errors() override { return {0, 0, static_cast<uint8_t>(rx_overruns_)}; }
+  LineErrors line_errors() override { return errors_; }
   uint32_t set_pulses(const Pulses& pulses, uint8_t attached) override;
+  uint8_t late_pulses() override { return late_pulses_; }
   SensorReading read_sensor() override;
   protocol::ResetCause reset_cause() override { return reset_cause_; }
   Retained& retained() override { return retained_; }
+  uint16_t bandgap_part() override { return bandgap_part_; }
+  bool stop_switch_open() override { return stop_switch_open_; }
+  bool eeprom_ready() override { return board_us_ >= eeprom_ready_us_; }
+  uint8_t eeprom_read(uint16_t address) override { return eeprom_[address]; }
+  void eeprom_write(uint16_t address, uint8_t value) override;
 
  private:
   static constexpr uint8_t kSamples = 8;
+  static constexpr uint16_t kEepromBytes = 1024;
+  static constexpr uint16_t kEepromWriteUs = 3400;
   struct Sample {
     int32_t pressure_raw;
     uint64_t sampled_us;
@@ -67,7 +86,8 @@ class HostHal : public Hal {
   uint64_t board_us_ = 0;
   ReceiveRing receive_;
   TransmitRing transmit_;
-  uint32_t rx_overruns_ = 0;
+  LineErrors errors_ = {};
+  uint8_t late_pulses_ = 0;
   Pulses next_ = {};
   uint8_t next_attached_ = 0;
   Pulses output_ = {};
@@ -76,7 +96,12 @@ class HostHal : public Hal {
   Sample samples_[kSamples] = {};
   uint8_t sample_count_ = 0;
   protocol::ResetCause reset_cause_ = protocol::ResetCause::kPowerOn;
-  Retained retained_ = {};
+  Retained retained_;
+  uint16_t bandgap_part_ = supply_mv(5000);
+  bool stop_switch_open_ = true;  // there is none
+  uint8_t eeprom_[kEepromBytes];
+  uint32_t eeprom_writes_ = 0;
+  uint64_t eeprom_ready_us_ = 0;
 };
 
 }  // namespace setae

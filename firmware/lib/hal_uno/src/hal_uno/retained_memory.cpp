@@ -2,20 +2,18 @@
 
 #include <avr/io.h>
 #include <avr/wdt.h>
-#include <string.h>
-
-#include "protocol/crc32c.h"
 
 namespace setae {
 namespace retained_memory {
 namespace {
 
 constexpr uint16_t kStallMark = 0x5A3C;
+constexpr uint32_t kAliveMark = 0xC0A1E5CE;
 
 struct Block {
   Retained retained;
+  uint32_t alive;  // the memory kept its content: power was there all the time
   volatile uint16_t stall;
-  uint32_t crc;
 };
 
 // The start-up code leaves this section alone.
@@ -24,30 +22,22 @@ uint8_t reset_flags __attribute__((section(".noinit")));
 
 protocol::ResetCause cause = protocol::ResetCause::kUnknown;
 
-uint32_t crc_of_content() {
-  uint8_t bytes[sizeof(Retained)];
-  memcpy(bytes, &block.retained, sizeof(bytes));
-  return protocol::crc32c(bytes, sizeof(bytes));
-}
-
 }  // namespace
 
 void begin() {
-  const bool valid = block.crc == crc_of_content();
+  const bool kept = block.alive == kAliveMark;
   // A watchdog reset is known by the mark alone: bootloaders use the watchdog to start us.
-  if (valid && block.stall == kStallMark) {
+  if (kept && block.stall == kStallMark) {
     cause = protocol::ResetCause::kWatchdog;
   } else if (reset_flags & _BV(PORF)) {
     cause = protocol::ResetCause::kPowerOn;
   } else if (reset_flags & _BV(BORF)) {
     cause = protocol::ResetCause::kBrownOut;
-  } else if (valid || (reset_flags & _BV(EXTRF))) {
+  } else if (kept || (reset_flags & _BV(EXTRF))) {
     cause = protocol::ResetCause::kExternal;
   }
-  if (!valid)
-    memset(&block.retained, 0, sizeof(block.retained));
+  block.alive = kAliveMark;
   block.stall = 0;
-  seal();
 }
 
 protocol::ResetCause reset_cause() {
@@ -56,10 +46,6 @@ protocol::ResetCause reset_cause() {
 
 Retained& content() {
   return block.retained;
-}
-
-void seal() {
-  block.crc = crc_of_content();
 }
 
 void mark_stall_from_interrupt() {

@@ -6,12 +6,10 @@
 namespace setae {
 namespace retained_memory {
 
-// Checks what the last run left.
+// Looks at what the last run left.
 void begin();
 protocol::ResetCause reset_cause();
 Retained& content();
-// Makes the content valid for the next start.
-void seal();
 // For the watchdog's handler.
 void mark_stall_from_interrupt();
 void clear_stall();

@@ -5,8 +5,11 @@
 #include <avr/wdt.h>
 #include <util/atomic.h>
 
+#include "hal_uno/eeprom.h"
 #include "hal_uno/retained_memory.h"
 #include "hal_uno/servo_pulses.h"
+#include "hal_uno/stop_switch.h"
+#include "hal_uno/supply.h"
 #include "hal_uno/uart.h"
 
 namespace setae {
@@ -26,6 +29,9 @@ void start_watchdog() {
 
 void UnoHal::begin() {
   retained_memory::begin();
+  eeprom::begin();
+  supply::begin();
+  stop_switch::begin();
   uart::begin();
   servo_pulses::begin();
   sensor_.begin();
@@ -61,9 +67,7 @@ LineErrors UnoHal::line_errors() {
 }
 
 uint32_t UnoHal::set_pulses(const Pulses& pulses, uint8_t attached) {
-  const uint32_t frame = servo_pulses::set(pulses, attached);
-  retained_memory::seal();  // once a frame, after the board wrote it
-  return frame;
+  return servo_pulses::set(pulses, attached);
 }
 
 SensorReading UnoHal::read_sensor() {
@@ -76,6 +80,30 @@ protocol::ResetCause UnoHal::reset_cause() {
 
 Retained& UnoHal::retained() {
   return retained_memory::content();
+}
+
+uint8_t UnoHal::late_pulses() {
+  return servo_pulses::late_armings();
+}
+
+uint16_t UnoHal::bandgap_part() {
+  return supply::bandgap_part();
+}
+
+bool UnoHal::stop_switch_open() {
+  return stop_switch::open();
+}
+
+bool UnoHal::eeprom_ready() {
+  return eeprom::ready();
+}
+
+uint8_t UnoHal::eeprom_read(uint16_t address) {
+  return eeprom::read(address);
+}
+
+void UnoHal::eeprom_write(uint16_t address, uint8_t value) {
+  eeprom::write(address, value);
 }
 
 }  // namespace setae

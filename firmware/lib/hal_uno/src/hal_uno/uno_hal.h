@@ -23,6 +23,12 @@ class UnoHal final : public Hal {
   SensorReading read_sensor() override;
   protocol::ResetCause reset_cause() override;
   Retained& retained() override;
+  uint8_t late_pulses() override;
+  uint16_t bandgap_part() override;
+  bool stop_switch_open() override;
+  bool eeprom_ready() override;
+  uint8_t eeprom_read(uint16_t address) override;
+  void eeprom_write(uint16_t address, uint8_t value) override;
 
  private:
   Lps33hw sensor_;

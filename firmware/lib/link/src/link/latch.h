@@ -1,8 +1,10 @@
-// One record that the host must not miss: repeated until acknowledged, readable ever after.
+// One record that the host must not miss: repeated until acknowledged, readable ever after,
+// through a reset too.
 #pragma once
 
 #include <stdint.h>
 
+#include "hal/retained.h"
 #include "protocol/messages.h"
 
 namespace setae {
@@ -11,33 +13,51 @@ namespace setae {
 template <typename Record>
 class Latch {
  public:
-  // The host has not acknowledged it.
-  bool pending() const { return pending_; }
-  const Record& record() const { return record_; }
+  using Memory = Sealed<LatchMemory<Record>>;
 
-  // The newest wins; that the id then rises by more than one shows the host what it missed.
+  // Takes over what the last run left.
+  void begin(Memory& memory) {
+    memory_ = &memory;
+    if (!memory.whole())
+      memory.clear();
+    repeat_ = pending();
+  }
+
+  // The host has not acknowledged it. Then nothing may take its place.
+  bool pending() const { return memory_->value.pending; }
+  const Record& record() const { return memory_->value.record; }
+
   void set(const Record& record, uint8_t session) {
-    const uint8_t id = record_.record_id == 255 ? 1 : record_.record_id + 1;
-    record_ = record;
-    record_.record_id = id;
-    record_.session = session;
-    pending_ = true;
-    repeat_ = true;
-    age_frames_ = 0;
+    Record& kept = memory_->value.record;
+    const uint8_t id = kept.record_id == 255 ? 1 : kept.record_id + 1;
+    kept = record;
+    kept.record_id = id;
+    kept.session = session;
+    memory_->value.pending = true;
+    send();
+  }
+
+  // Another one came while this one waits.
+  void count_further() {
+    uint8_t& further = memory_->value.record.further;
+    if (further != 255)
+      ++further;
+    send();
   }
 
   void acknowledge(uint8_t record_id) {
-    if (record_id != record_.record_id)
+    if (record_id != record().record_id)
       return;
-    pending_ = false;
+    memory_->value.pending = false;
+    memory_->seal();
     repeat_ = false;
   }
 
   // Send it once more. Nothing to send where nothing was ever latched.
-  void recall() { recalled_ = record_.record_id != 0; }
+  void recall() { recalled_ = record().record_id != 0; }
 
   void on_frame() {
-    if (!pending_ || ++age_frames_ < protocol::kRecordRepeatFrames)
+    if (!pending() || ++age_frames_ < protocol::kRecordRepeatFrames)
       return;
     age_frames_ = 0;
     repeat_ = true;
@@ -51,8 +71,13 @@ class Latch {
   }
 
  private:
-  Record record_ = {};
-  bool pending_ = false;
+  void send() {
+    memory_->seal();
+    repeat_ = true;
+    age_frames_ = 0;
+  }
+
+  Memory* memory_ = nullptr;
   bool repeat_ = false;
   bool recalled_ = false;
   uint8_t age_frames_ = 0;

@@ -46,6 +46,11 @@ constexpr uint8_t kRecordRepeatFrames = 5;
 constexpr uint8_t kTareSamples = 8;
 // Servo frames without a fresh sample after which the sensor counts as silent.
 constexpr uint8_t kSensorSilentFrames = 5;
+// Samples that agree in every bit after which the sensor counts as stuck (the LPS33HW's own noise
+// is about 30 LSB).
+constexpr uint8_t kSensorStuckSamples = 16;
+// Servo frames between two `status` messages.
+constexpr uint8_t kStatusFrames = 50;
 // Compiled-in lower bound of every pulse (500 us).
 constexpr uint16_t kPulseTicksAbsoluteMin = 1000;
 // Compiled-in upper bound of every pulse (2500 us).
@@ -53,7 +58,7 @@ constexpr uint16_t kPulseTicksAbsoluteMax = 5000;
 // Servo frames between attaching one servo and the next: one start-up current at a time.
 constexpr uint8_t kAttachIntervalFrames = 5;
 // CRC-32C of what host and board must agree on; they compare it in the handshake.
-constexpr uint32_t kSchemaHash = 0xA3B40BE7;
+constexpr uint32_t kSchemaHash = 0x735AE189;
 // CRC, COBS code byte and delimiter: what a frame has besides header and payload.
 constexpr uint8_t kCrcBytes = 4;
 constexpr uint8_t kStuffingBytes = 2;
@@ -133,14 +138,18 @@ enum class Fault : uint8_t {
   kSensorBus = 4,
   // The pressure is outside 260 to 1260 hPa, which the sensor can't measure.
   kSensorRange = 5,
+  // Samples arrive, but their value has not changed in a single bit.
+  kSensorStuck = 6,
+  // The pressure jumps up and down by more than 5 hPa from sample to sample.
+  kSensorNoisy = 7,
   // The firmware's loop stalled and the watchdog reset the board.
-  kWatchdog = 6,
+  kWatchdog = 8,
   // The board's supply fell below 3.8 V.
-  kSupplyLow = 7,
+  kSupplyLow = 9,
   // The firmware found its own state inconsistent.
-  kInternal = 8,
+  kInternal = 10,
 };
-constexpr uint8_t kFaultCount = 9;
+constexpr uint8_t kFaultCount = 11;
 
 // Why a command was not carried out. A refused `segments` or `guard` also drops the queue and
 // raises the epoch.
@@ -180,8 +189,12 @@ enum class Refusal : uint8_t {
   kTareFar = 15,
   // The reflex has not ended yet.
   kReflexRunning = 16,
+  // The board's supply is too low to write its EEPROM.
+  kSupplyLow = 17,
+  // The stop switch is open.
+  kStopSwitch = 18,
 };
-constexpr uint8_t kRefusalCount = 17;
+constexpr uint8_t kRefusalCount = 19;
 
 // Why the board started.
 enum class ResetCause : uint8_t {
@@ -212,8 +225,12 @@ enum class Sensor : uint8_t {
   kBus = 4,
   // The sample is outside the sensor's range.
   kRange = 5,
+  // Samples arrive, but their value never changes.
+  kStuck = 6,
+  // The samples jump up and down.
+  kNoisy = 7,
 };
-constexpr uint8_t kSensorCount = 6;
+constexpr uint8_t kSensorCount = 8;
 
 enum class MessageType : uint8_t {
   kHello = 0x01,
@@ -230,6 +247,7 @@ enum class MessageType : uint8_t {
   kGuard = 0x15,
   kDisarm = 0x16,
   kSetLimits = 0x17,
+  kStoreLimits = 0x18,
   kHelloReply = 0x81,
   kReceipt = 0x82,
   kPong = 0x83,
@@ -238,6 +256,7 @@ enum class MessageType : uint8_t {
   kFault = 0x86,
   kRefusal = 0x87,
   kLimits = 0x88,
+  kStatus = 0x89,
 };
 
 #ifdef __AVR__
@@ -433,7 +452,7 @@ inline void decode(const uint8_t* in, Ping& message) {
 }
 #endif
 
-// The host has a record; the board stops repeating it and may overwrite it.
+// The host has a record; the board stops repeating it, and the next one may take its place.
 struct Acknowledge {
   static constexpr MessageType kType = MessageType::kAcknowledge;
   static constexpr uint8_t kSize = 2;
@@ -698,7 +717,7 @@ inline void decode(const uint8_t* in, Disarm& message) {
 // Set the limits. Only while relaxed; inside the compiled-in bounds.
 struct SetLimits {
   static constexpr MessageType kType = MessageType::kSetLimits;
-  static constexpr uint8_t kSize = 40;
+  static constexpr uint8_t kSize = 41;
 
   // Lowest pulse of each servo.
   uint16_t pulse_min_ticks[4];
@@ -718,6 +737,9 @@ struct SetLimits {
   uint32_t coarse_threshold_raw;
   // Holding this long without a host relaxes; 0 never does.
   uint16_t hold_timeout_s;
+  // 1: a normally closed switch from D4 to ground stops the robot when it opens; 0: D4 is not
+  // looked at.
+  uint8_t stop_switch;
 };
 
 #ifndef __AVR__
@@ -743,6 +765,7 @@ inline void encode(const SetLimits& message, uint8_t* out) {
   }
   detail::put32(message.coarse_threshold_raw, out + 34);
   detail::put16(message.hold_timeout_s, out + 38);
+  detail::put8(message.stop_switch, out + 40);
 }
 inline void decode(const uint8_t* in, SetLimits& message) {
   for (uint8_t i = 0; i < 4; ++i) {
@@ -766,6 +789,26 @@ inline void decode(const uint8_t* in, SetLimits& message) {
   }
   message.coarse_threshold_raw = detail::get32(in + 34);
   message.hold_timeout_s = detail::get16(in + 38);
+  message.stop_switch = detail::get8(in + 40);
+}
+#endif
+
+// Write the limits in force to EEPROM, for the next start. Only while relaxed; `status` tells when
+// it is done.
+struct StoreLimits {
+  static constexpr MessageType kType = MessageType::kStoreLimits;
+  static constexpr uint8_t kSize = 1;
+
+  // 0.
+  uint8_t reserved;
+};
+
+#ifndef __AVR__
+inline void encode(const StoreLimits& message, uint8_t* out) {
+  detail::put8(message.reserved, out);
+}
+inline void decode(const uint8_t* in, StoreLimits& message) {
+  message.reserved = detail::get8(in);
 }
 #endif
 
@@ -1035,12 +1078,14 @@ inline void decode(const uint8_t* in, Trip& message) {
 // Latched record of a fault.
 struct FaultMessage {
   static constexpr MessageType kType = MessageType::kFault;
-  static constexpr uint8_t kSize = 21;
+  static constexpr uint8_t kSize = 22;
 
   // Raised with each fault; never 0.
   uint8_t record_id;
   // The session in which it was latched; 0 where there was none.
   uint8_t session;
+  // Faults since then that this record kept from being latched, at most 255.
+  uint8_t further;
   // What is broken. (Fault)
   uint8_t fault;
   // A figure that depends on the fault.
@@ -1057,23 +1102,25 @@ struct FaultMessage {
 inline void encode(const FaultMessage& message, uint8_t* out) {
   detail::put8(message.record_id, out);
   detail::put8(message.session, out + 1);
-  detail::put8(message.fault, out + 2);
-  detail::put32(message.detail, out + 3);
-  detail::put32(message.frame, out + 7);
-  detail::put16(message.phase_us, out + 11);
+  detail::put8(message.further, out + 2);
+  detail::put8(message.fault, out + 3);
+  detail::put32(message.detail, out + 4);
+  detail::put32(message.frame, out + 8);
+  detail::put16(message.phase_us, out + 12);
   for (uint8_t i = 0; i < 4; ++i) {
-    detail::put16(message.pulse_ticks[i], out + 13 + i * 2);
+    detail::put16(message.pulse_ticks[i], out + 14 + i * 2);
   }
 }
 inline void decode(const uint8_t* in, FaultMessage& message) {
   message.record_id = detail::get8(in);
   message.session = detail::get8(in + 1);
-  message.fault = detail::get8(in + 2);
-  message.detail = detail::get32(in + 3);
-  message.frame = detail::get32(in + 7);
-  message.phase_us = detail::get16(in + 11);
+  message.further = detail::get8(in + 2);
+  message.fault = detail::get8(in + 3);
+  message.detail = detail::get32(in + 4);
+  message.frame = detail::get32(in + 8);
+  message.phase_us = detail::get16(in + 12);
   for (uint8_t i = 0; i < 4; ++i) {
-    message.pulse_ticks[i] = detail::get16(in + 13 + i * 2);
+    message.pulse_ticks[i] = detail::get16(in + 14 + i * 2);
   }
 }
 #endif
@@ -1132,6 +1179,52 @@ struct Limits : SetLimits {
   explicit Limits(const SetLimits& all) : SetLimits(all) {}
 };
 
+// Once per STATUS_FRAMES, and when a write to EEPROM ends.
+struct Status {
+  static constexpr MessageType kType = MessageType::kStatus;
+  static constexpr uint8_t kSize = 12;
+
+  // The board's supply; 0 before it was measured.
+  uint16_t supply_mv;
+  // CRC-32C of the limits in EEPROM, as a `limits` payload; 0 where there are none.
+  uint32_t stored_crc;
+  // 1 while limits are being written.
+  uint8_t storing;
+  // 1 if D4 is not connected to ground.
+  uint8_t stop_switch_open;
+  // Bytes without a stop bit since start, modulo 256.
+  uint8_t rx_framing_errors;
+  // Bytes that the UART lost because its handler came too late, modulo 256.
+  uint8_t rx_overruns;
+  // Bytes that the receive ring had no room for, modulo 256.
+  uint8_t rx_overflows;
+  // Pulse edges that were armed too late, modulo 256.
+  uint8_t late_pulses;
+};
+
+#ifndef __AVR__
+inline void encode(const Status& message, uint8_t* out) {
+  detail::put16(message.supply_mv, out);
+  detail::put32(message.stored_crc, out + 2);
+  detail::put8(message.storing, out + 6);
+  detail::put8(message.stop_switch_open, out + 7);
+  detail::put8(message.rx_framing_errors, out + 8);
+  detail::put8(message.rx_overruns, out + 9);
+  detail::put8(message.rx_overflows, out + 10);
+  detail::put8(message.late_pulses, out + 11);
+}
+inline void decode(const uint8_t* in, Status& message) {
+  message.supply_mv = detail::get16(in);
+  message.stored_crc = detail::get32(in + 2);
+  message.storing = detail::get8(in + 6);
+  message.stop_switch_open = detail::get8(in + 7);
+  message.rx_framing_errors = detail::get8(in + 8);
+  message.rx_overruns = detail::get8(in + 9);
+  message.rx_overflows = detail::get8(in + 10);
+  message.late_pulses = detail::get8(in + 11);
+}
+#endif
+
 // Payload bytes of a message from the host; 0xFF for a type that is none of them.
 constexpr uint8_t host_payload_size(MessageType type) {
   switch (type) {
@@ -1163,6 +1256,8 @@ constexpr uint8_t host_payload_size(MessageType type) {
       return Disarm::kSize;
     case MessageType::kSetLimits:
       return SetLimits::kSize;
+    case MessageType::kStoreLimits:
+      return StoreLimits::kSize;
     default:
       return 0xFF;
   }
@@ -1187,6 +1282,8 @@ constexpr uint8_t board_payload_size(MessageType type) {
       return RefusalMessage::kSize;
     case MessageType::kLimits:
       return Limits::kSize;
+    case MessageType::kStatus:
+      return Status::kSize;
     default:
       return 0xFF;
   }
@@ -1203,6 +1300,7 @@ constexpr bool is_reliable(MessageType type) {
     case MessageType::kGuard:
     case MessageType::kDisarm:
     case MessageType::kSetLimits:
+    case MessageType::kStoreLimits:
       return true;
     default:
       return false;
