@@ -50,12 +50,20 @@ bool LimitsStore::step(const SetLimits& limits) {
     load(unused);  // what can't be read back is not stored
     return true;
   }
-  // Made anew for each byte: no memory for what is needed once a year.
+  // All before it is gone through again for each byte: no memory for what is needed once a year.
   constexpr uint8_t kContentBytes = kSlotBytes - protocol::kCrcBytes;
-  uint8_t bytes[kSlotBytes] = {static_cast<uint8_t>(generation_ + 1), kLayout};
-  encode(limits, bytes + kHeaderBytes);
-  protocol::detail::put32(protocol::crc32c(bytes, kContentBytes), bytes + kContentBytes);
-  hal_.eeprom_write(kSlotAt[slot_ ^ 1] + position_, bytes[position_]);
+  protocol::Wire<SetLimits> wire(limits);
+  protocol::Crc32c crc;
+  uint8_t byte = generation_ + 1;
+  for (uint8_t i = 0; i < position_;) {
+    if (i < kContentBytes)
+      crc.add(byte);
+    ++i;
+    byte = i == 1              ? kLayout
+           : i < kContentBytes ? wire.bytes()[i - kHeaderBytes]
+                               : static_cast<uint8_t>(crc.value() >> 8 * (i - kContentBytes));
+  }
+  hal_.eeprom_write(kSlotAt[slot_ ^ 1] + position_, byte);
   ++position_;
   return false;
 }
