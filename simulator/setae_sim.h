@@ -78,6 +78,18 @@ int setae_world_add_tube(setae_world*, const double axis_point_mm[3], double inn
 int setae_world_add_box(setae_world*, const double centre_mm[3], const double edges_mm[3],
                         double yaw_rad);
 
+/* Upright prism with rounded upright edges; wall_mm > 0: open at the top and hollow. */
+int setae_world_add_prism(setae_world*, const double centre_mm[3], const double edges_mm[3],
+                          double corner_mm, double wall_mm, double yaw_rad);
+/* Lying ring of round section. */
+int setae_world_add_ring(setae_world*, const double centre_mm[3], double ring_radius_mm,
+                         double section_radius_mm);
+int setae_world_add_ellipsoid(setae_world*, const double centre_mm[3], const double semi_axes_mm[3],
+                              double yaw_rad);
+/* Height of the topmost solid at x, y between two heights; -infinity where there is none. */
+int setae_world_surface(setae_world*, double x_mm, double y_mm, double bottom_mm, double top_mm,
+                        double* z_mm);
+
 int setae_world_start(setae_world*, const double arm_mm[3]);
 
 int64_t setae_world_now_us(const setae_world*);

@@ -218,6 +218,65 @@ class World:
         edges = _vector("edges_mm", edges_mm)
         self._change(self._library.setae_world_add_box(self._live, centre, edges, yaw_rad))
 
+    def add_prism(
+        self,
+        centre_mm: Sequence[float],
+        edges_mm: Sequence[float],
+        *,
+        corner_mm: float = 0.0,
+        wall_mm: float = 0.0,
+        yaw_rad: float = 0.0,
+    ) -> None:
+        """Add an upright prism, before the start.
+
+        Parameters
+        ----------
+        corner_mm
+            Radius of its four upright edges.
+        wall_mm
+            Above 0: hollow and open at the top, its walls and bottom this thick.
+        """
+        centre, edges = _vector("centre_mm", centre_mm), _vector("edges_mm", edges_mm)
+        self._change(
+            self._library.setae_world_add_prism(
+                self._live, centre, edges, corner_mm, wall_mm, yaw_rad
+            )
+        )
+
+    def add_ring(
+        self, centre_mm: Sequence[float], ring_radius_mm: float, section_radius_mm: float
+    ) -> None:
+        """Add a lying ring of round section, before the start."""
+        centre = _vector("centre_mm", centre_mm)
+        self._change(
+            self._library.setae_world_add_ring(
+                self._live, centre, ring_radius_mm, section_radius_mm
+            )
+        )
+
+    def add_ellipsoid(
+        self, centre_mm: Sequence[float], semi_axes_mm: Sequence[float], yaw_rad: float = 0.0
+    ) -> None:
+        """Add an upright ellipsoid, turned by yaw about z, before the start."""
+        centre, axes = _vector("centre_mm", centre_mm), _vector("semi_axes_mm", semi_axes_mm)
+        self._change(self._library.setae_world_add_ellipsoid(self._live, centre, axes, yaw_rad))
+
+    def surface_mm(self, x_mm: float, y_mm: float, *, bottom_mm: float, top_mm: float) -> float:
+        """Height of the topmost solid at a place of the world, true.
+
+        Returns
+        -------
+        float
+            Between the two heights; -inf where there is nothing between them.
+        """
+        z_mm = ctypes.c_double()
+        self._check(
+            self._library.setae_world_surface(
+                self._live, x_mm, y_mm, bottom_mm, top_mm, ctypes.byref(z_mm)
+            )
+        )
+        return z_mm.value
+
     def start(self, arm_mm: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Switch the power on, with the origin of frame D at `arm_mm` in the world.
 
