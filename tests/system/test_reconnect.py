@@ -29,6 +29,7 @@ from setae_protocol.messages import (
     Resume,
     Segment,
     Segments,
+    Sensor,
     State,
     Telemetry,
     TripCause,
@@ -78,6 +79,25 @@ def connect(world: World, session_id: int) -> tuple[Session, Shown]:
 def enable(session: Session) -> None:
     session.request(Enable(pulse_ticks=pose(START_TICKS)))
     session.run_until(lambda: session.state is State.HOLDING, SECOND_US)
+
+
+def guard_and_move(session: Session) -> None:
+    """A motion of four seconds under a guard that trips after half of one."""
+    guard = GuardMessage(
+        epoch=session.epoch, threshold_raw=15 * PRESSURE_LSB_PER_HPA, consecutive=2,
+        deadline_frames=25, reflex=Reflex.HOLD, retract_ticks=pose(START_TICKS),
+        retract_slew_ticks=0,
+    )  # fmt: skip
+
+    session.run_until(lambda: _telemetry(session).sensor is Sensor.OK, 5 * SECOND_US)
+    session.request(guard)
+    session.request(motion(session.epoch, frames=200))
+    session.run_until(lambda: _telemetry(session).guard is Guard.ARMED, SECOND_US)
+
+
+def _telemetry(session: Session) -> Telemetry:
+    assert session.telemetry is not None
+    return session.telemetry
 
 
 @pytest.fixture
@@ -141,14 +161,7 @@ def test_trip_without_a_host_is_read_by_the_next_as_earlier(world: World) -> Non
     """A guarded move ends by itself; nothing moves on before somebody has resumed."""
     first, _ = connect(world, 7)
     enable(first)
-    guard = GuardMessage(
-        epoch=first.epoch, threshold_raw=15 * PRESSURE_LSB_PER_HPA, consecutive=2,
-        deadline_frames=25, reflex=Reflex.HOLD, retract_ticks=pose(START_TICKS),
-        retract_slew_ticks=0,
-    )  # fmt: skip
-    first.request(guard)
-    first.request(motion(first.epoch, frames=200))
-    first.run_until(lambda: _armed(first), SECOND_US)
+    guard_and_move(first)
     pass_time(world, 2 * SECOND_US)
     second, shown = connect(world, 9)
     second.run_for(SECOND_US)
@@ -159,10 +172,6 @@ def test_trip_without_a_host_is_read_by_the_next_as_earlier(world: World) -> Non
     assert len(shown.poses) == 1
     with pytest.raises(RefusedError, match="tripped"):
         second.request(motion(second.epoch, frames=50))
-
-
-def _armed(session: Session) -> bool:
-    return session.telemetry is not None and session.telemetry.guard is Guard.ARMED
 
 
 # ------------------------------------------------------------------- cable, and reset button
@@ -206,6 +215,22 @@ def test_reset_board_is_limp_and_stays_so_for_the_next_session(world: World) -> 
         second.request(motion(second.epoch, frames=50))
     second.run_for(SECOND_US)
     assert {telemetry.attached for telemetry in shown.telemetry} == {0}
+
+
+def test_trip_is_read_after_the_board_was_reset(world: World) -> None:
+    """Opening a UNO's port resets it: what a dead host's robot touched must survive that."""
+    first, _ = connect(world, 7)
+    enable(first)
+    guard_and_move(first)
+    pass_time(world, 2 * SECOND_US)
+    world.reset_board()
+    second, shown = connect(world, 9)
+    second.run_for(SECOND_US)
+    assert [(trip.earlier, trip.record.session, trip.record.cause) for trip in shown.trips] == [
+        (True, 7, TripCause.DEADLINE)
+    ]
+    assert {telemetry.attached for telemetry in shown.telemetry} == {0}
+    assert second.state is State.RELAXED
 
 
 def test_second_program_takes_over_and_the_first_is_told(world: World) -> None:
