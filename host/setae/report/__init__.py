@@ -1,6 +1,6 @@
 """Reports: what a run's logs say, as a web page, pictures and tables.
 
-`write` is the way in. `explore` and `validation` are the reports of the two
+`write` is the way in. `explore`, `validation` and `bristle` are the reports of the
 experiments, each with its page, pictures and tables; `paper` holds the paper's
 numbers. Of the exploration, `trial` reads a log, and `shapes` and `drawing` draw
 the robot. Matplotlib and Plotly come with the extra ``report`` and are imported
@@ -15,11 +15,11 @@ from pathlib import Path
 from setae import record
 from setae.errors import LogError
 from setae.record import Log
-from setae.report import explore, files, validation
+from setae.report import bristle, explore, files, validation
 
-__all__ = ["explore", "validation", "write"]
+__all__ = ["bristle", "explore", "validation", "write"]
 
-_WRITERS = {"explore": explore.write, "validate": validation.write}
+_WRITERS = {"explore": explore.write, "validate": validation.write, "bristle": bristle.write}
 
 
 def write(logs: str | Path | Iterable[str | Path | Log], path: str | Path) -> Path:

@@ -78,6 +78,14 @@ def picture(path: Path, effects: Sequence[Effect], note: str) -> Path:
     return path
 
 
+_NOTE = (
+    "The same targets, driven on plants with one imperfection alone, and with all but one. Causes "
+    "hide one another, so the two orders differ: what mending gains is what a lab would see. A "
+    "tendon model is the host’s part: “mended” means commanding with that model. Mean errors in "
+    "the bending plane, mm."
+)
+
+
 def section(effects: Sequence[Effect], drawn: Path) -> str:
     """Return the page's part about causes."""
     first = effects[0]
@@ -102,10 +110,7 @@ def section(effects: Sequence[Effect], drawn: Path) -> str:
     return (
         '<h2 id="causes">What to mend first</h2>'
         f'<p class="lead"><b>{html.escape(finding(effects))}</b></p>'
-        '<p class="note">The same targets, driven on plants with one imperfection alone, and with '
-        "all but one. Causes hide one another, so the two orders differ: what mending gains is what "
-        "a lab would see. A tendon model is the host’s part: “mended” means commanding with that "
-        "model. Mean errors in the bending plane, mm.</p>"
+        f'<p class="note">{_NOTE}</p>'
         '<div class="scroll"><table><thead><tr><th>cause</th><th>it alone</th><th>adds</th>'
         "<th>all but it</th><th>mending gains</th></tr></thead>"
         f"<tbody>{body}</tbody></table></div>"
