@@ -1,0 +1,59 @@
+"""Damaged frames and fuzzing: what gets through, and how much was tried."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+
+from bench.figure import Figure
+from tests.fuzz import damage, fuzz
+
+FRAMES = 30_000_000
+FRAMES_IN_PYTHON = 1_000_000
+
+
+def damaged_frames() -> Iterable[Figure]:
+    """Whether a damaged frame passes for a right one."""
+    counts = [damage.count(pattern, FRAMES) for pattern in damage.PATTERNS]
+    each = FRAMES_IN_PYTHON // len(damage.PATTERNS)
+    differing = [damage.disagreement(pattern, each) for pattern in damage.PATTERNS]
+    yield Figure(
+        "damaged_frames",
+        min(count.damaged for count in counts),
+        "frames",
+        f"damaged frames through the C++ decoder, of each of {len(damage.PATTERNS)} patterns:"
+        f" {', '.join(damage.PATTERNS)}; {FRAMES_IN_PYTHON} more through both decoders, which"
+        f" disagree on {sum(map(bool, differing))} patterns",
+    )
+    yield Figure(
+        "undetected_frames",
+        sum(count.undetected for count in counts),
+        "frames",
+        "of all those: handed out, and not what was sent",
+    )
+
+
+def fuzzing() -> Iterable[Figure]:
+    """How much fuzzers have tried against the firmware, and what broke."""
+    runs = json.loads(fuzz.RUNS.read_text())
+    targets = sorted({run["target"] for run in runs})
+    parts = [
+        f"{target} {sum(run['executions'] for run in runs if run['target'] == target)}"
+        for target in targets
+    ]
+    yield Figure(
+        "fuzz_executions",
+        sum(run["executions"] for run in runs),
+        "inputs",
+        f"`make fuzz`, as recorded in tests/fuzz/runs.json: {', '.join(parts)}; the last run on"
+        f" {runs[-1]['date']}, commit {runs[-1]['commit']}",
+    )
+    yield Figure(
+        "fuzz_crashes", sum(run["crashes"] for run in runs), "runs", "of those: ended by a fault"
+    )
+
+
+FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
+    "damaged_frames": damaged_frames,
+    "fuzzing": fuzzing,
+}
