@@ -59,8 +59,6 @@ class Witness:
         What it latched.
     moved_while_frozen
         Frames in which the pulses changed although it was stopped, tripped or in fault.
-    bytes_down
-        What came to the board.
     """
 
     simulated = True
@@ -70,25 +68,17 @@ class Witness:
         self.name = inner.name
         # Each a lookup that the link makes ten times a command.
         self.now_us = inner.now_us
+        self.send = inner.send
+        self.close = inner.close
         self.taken = 0
         self.played: list[int] = []
         self.records: list[Record] = []
         self.moved_while_frozen = 0
-        self.bytes_down = 0
         self._decoder = BoardDecoder()
         self._partial = b""
         self._expected = 0
         self._last_ids: dict[type[Record], int] = {}
         self._frozen_for = 0
-
-    def send(self, data: bytes) -> None:
-        """Pass on."""
-        self.bytes_down += len(data)
-        self.inner.send(data)
-
-    def close(self) -> None:
-        """Pass on."""
-        self.inner.close()
 
     def receive(self, deadline_us: int) -> tuple[bytes, int] | None:
         """Pass on, and look at it."""
