@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from setae.errors import InputError, LogError
 from setae.record import FLUSH_US, TOPICS, Recorder, read
+from setae.record.topics import JSON_RECORD, PROFILE
 
 METADATA: dict[str, Any] = {
     "simulated": True,
@@ -244,3 +246,39 @@ def test_an_unknown_field_is_refused(tmp_path: Path) -> None:
     log = read(write_seconds(tmp_path / "run.mcap", 0.1))
     with pytest.raises(InputError, match="pulse_us"):
         log.array("/telemetry", "pulse_ms")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"[]",
+        b"7",
+        b'{"time_us": null}',
+        b'{"time_us": 1}',
+        b'{"time_us": 9e99, "name": "", "args": {}}',
+        b'{"time_us": 1, "name": [], "args": {}}',
+    ],
+)
+def test_a_message_that_is_not_of_its_topic_is_damage(tmp_path: Path, body: bytes) -> None:
+    # A whole file with a message of another shape raised TypeError, KeyError or OverflowError,
+    # some while it was read, some only when it was used.
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as out:
+        writer = Writer(out)
+        writer.start(profile=PROFILE, library="")
+        writer.add_metadata(JSON_RECORD, {"deep": "[" * 100_000})  # RecursionError
+        schema = writer.register_schema("any", "jsonschema", b"{}")
+        writer.add_message(writer.register_channel("/command", "json", schema), 0, body, 0)
+        writer.finish()
+    log = read(path)
+    assert log.damage is not None
+    assert log.messages("/command") == []
+
+
+def test_a_field_that_holds_objects_is_no_array(tmp_path: Path) -> None:
+    # A TypeError of numpy's, without a word of what to do.
+    path = tmp_path / "log.mcap"
+    with Recorder(path) as recorder:
+        recorder.command(0, "move", {"to": 1})
+    with pytest.raises(InputError, match="messages"):
+        read(path).array("/command", "args")

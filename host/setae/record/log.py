@@ -111,11 +111,13 @@ class Log:
         Raises
         ------
         InputError
-            The topic has no such field.
+            The topic has no such field, or it holds objects, not values.
         """
         if field not in TOPICS.get(topic, {}):
             known = ", ".join(TOPICS[topic]) if topic in TOPICS else "no such topic"
             raise InputError(f"{topic} has no field {field!r}.", f"It has: {known}.")
+        if "object" in TOPICS[topic][field]["type"]:
+            raise InputError(f"{field!r} of {topic} is no array.", f"Use messages({topic!r}).")
         values = [m[field] for m in self._messages.get(topic, ())]
         kind = TOPICS[topic][field]["type"]
         if kind == "boolean":

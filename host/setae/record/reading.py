@@ -19,7 +19,7 @@ from mcap.stream_reader import breakup_chunk
 
 from setae.errors import LogError
 from setae.record.log import Damage, Log
-from setae.record.topics import JSON_RECORD, PROFILE, TEXT_RECORD, TOPICS
+from setae.record.topics import JSON_RECORD, PROFILE, TEXT_RECORD, TOPICS, fits
 
 _MAGIC: Final = b"\x89MCAP0\r\n"
 
@@ -111,6 +111,8 @@ class _Reading:
         # Channels are numbered in the order of TOPICS, should their own records be lost.
         topic = self._topics.get(item.channel_id) or list(TOPICS)[item.channel_id - 1]
         message = orjson.loads(item.data)
+        if not fits(topic, message):
+            raise ValueError(f"no message of {topic}")
         self._last_time_us = max(self._last_time_us, message["time_us"])
         self.messages.setdefault(topic, []).append(message)
 
@@ -130,6 +132,7 @@ _BROKEN = (
     ValueError,  # a wrong CRC, JSON or UTF-8
     LookupError,
     MemoryError,  # a broken size
+    RecursionError,  # JSON that is nested too deep
     struct.error,
     zstandard.ZstdError,
 )

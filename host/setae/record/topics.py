@@ -88,3 +88,32 @@ def schema(topic: str) -> bytes:
     properties.update(TOPICS[topic])
     whole = {"type": "object", "required": list(properties), "properties": properties}
     return json.dumps(whole, separators=(",", ":")).encode()
+
+
+def fits(topic: str, message: object) -> bool:
+    """Whether a message has every field of its topic, each of its type."""
+    if not isinstance(message, dict):
+        return False
+    fields = {"time_us": _INTEGER, **TOPICS.get(topic, {})}
+    return all(name in message and _is(field, message[name]) for name, field in fields.items())
+
+
+def _is(field: Mapping[str, Any], value: object) -> bool:
+    kind = field["type"]
+    if kind == "array":
+        return (
+            isinstance(value, list)
+            and len(value) == field["maxItems"]
+            and all(_is(field["items"], item) for item in value)
+        )
+    if isinstance(value, bool):  # which Python counts among the integers
+        return bool(kind == "boolean")
+    if value is None:
+        return "null" in kind
+    if isinstance(value, int):
+        return "number" in kind or (kind == "integer" and -(2**63) <= value < 2**63)
+    if isinstance(value, float):
+        return "number" in kind
+    return (kind == "string" and isinstance(value, str)) or (
+        "object" in kind and isinstance(value, dict)
+    )
