@@ -411,12 +411,9 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
     write(w.arm().position_mm(w.now_us()), out->arm_mm);
     write(w.arm().target_mm(), out->arm_target_mm);
     out->arm_moving = w.arm().moving(w.now_us());
-    out->board_attached = w.hal().attached();
+    out->board_attached = static_cast<int32_t>(w.attached());
     for (int i = 0; i < SETAE_TENDONS; ++i) {
-      if (w.hal().attached() >> i & 1) {
-        out->pulse_us[i] =
-            static_cast<double>(w.hal().output().ticks[i]) / setae::protocol::kPulseTicksPerUs;
-      }
+      out->pulse_us[i] = w.pulse_us(i);
       out->servo_length_mm[i] = truth.body.servos[i].length_mm();
       out->tension_n[i] = truth.top.tension_n[i];
     }
@@ -474,5 +471,37 @@ SETAE_EXPORT int setae_world_reset_board(setae_world* world) {
   return guarded(world, [&] {
     world->world->reset_board();
     return 0;
+  });
+}
+
+SETAE_EXPORT int setae_world_remove_board(setae_world* world) {
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
+  return guarded(world, [&] {
+    world->world->remove_board();
+    return 0;
+  });
+}
+
+SETAE_EXPORT int setae_world_pulse(setae_world* world, int servo, double width_us) {
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
+  if (servo < 0 || servo >= SETAE_TENDONS || !std::isfinite(width_us) || width_us < 0)
+    return fail(world, kBadArgument, "a pulse needs a servo, 0 to 3, and a width of 0 or more");
+  world->world->pulse(servo, width_us);
+  return 0;
+}
+
+SETAE_EXPORT int setae_world_sense(setae_world* world, double* pressure_hpa) {
+  if (!world->world)
+    return fail(world, kWrongTime, kNotStarted);
+  if (pressure_hpa == nullptr)
+    return fail(world, kBadArgument, "the pressure needs a place to go");
+  return guarded(world, [&] {
+    const int status =
+        outcome(world, world->world->sense(),
+                "the spring's equilibrium could not be found for several samples in a row");
+    *pressure_hpa = world->world->pressure_hpa();
+    return status;
   });
 }

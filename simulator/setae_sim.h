@@ -119,6 +119,13 @@ int setae_world_stop_switch(setae_world*, int open);
 /* The reset button, or DTR: the board starts anew, retained memory and EEPROM survive. */
 int setae_world_reset_board(setae_world*);
 
+/* A board outside of this world, in step with it: the one inside goes. Its pulses come as they
+ * end (a width of 0: there are no pulses any more), and the plant moves when its sensor takes a
+ * sample. Bytes don't pass here any more. */
+int setae_world_remove_board(setae_world*);
+int setae_world_pulse(setae_world*, int servo, double width_us);
+int setae_world_sense(setae_world*, double* pressure_hpa);
+
 #ifdef __cplusplus
 }
 #endif

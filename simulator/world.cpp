@@ -218,6 +218,31 @@ void World::reset_board() {
   }
 }
 
+void World::remove_board() {
+  reset_board();
+  boot_us_ = kNever;
+  next_sample_us_ = kNever;
+  outside_ = true;
+}
+
+void World::pulse(int servo, double width_us) {
+  outside_us_[servo] = width_us;
+  Servo& driven = body_.servos[servo];
+  driven.advance_to(now_us_);
+  if (width_us > 0) {
+    driven.pulse(now_us_, width_us);
+  } else {
+    driven.detach();
+  }
+}
+
+Outcome World::sense() {
+  next_sample_us_ = now_us_;
+  sample();
+  next_sample_us_ = kNever;
+  return unsolved_ >= kUnsolvedMost || foreign_failed_ ? outcome() : Outcome::kFine;
+}
+
 bool World::start_frame() {
   if (!board_ || next_frame_us_ > now_us_)
     return false;
@@ -332,7 +357,7 @@ void World::move(Body& body, int64_t duration_us) const {
 void World::ask_foreign() {
   if (!foreign_)
     return;
-  Drive drive{now_us_, hal_.attached(), {}, {}};
+  Drive drive{now_us_, attached(), {}, {}};
   for (int i = 0; i < kTendons; ++i) {
     drive.pulse_us[i] = pulse_us(i);
     drive.pull_mm[i] = parameters_.spring.free_length_mm - body_.servos[i].length_mm();
@@ -340,7 +365,18 @@ void World::ask_foreign() {
   foreign_failed_ = !foreign_(drive, answer_);
 }
 
+uint32_t World::attached() const {
+  if (!outside_)
+    return hal_.attached();
+  uint32_t bits = 0;
+  for (int i = 0; i < kTendons; ++i)
+    bits |= outside_us_[i] > 0 ? 1u << i : 0u;
+  return bits;
+}
+
 double World::pulse_us(int tendon) const {
+  if (outside_)
+    return outside_us_[tendon];
   if ((hal_.attached() >> tendon & 1) == 0)
     return 0;
   return static_cast<double>(hal_.output().ticks[tendon]) / protocol::kPulseTicksPerUs;

@@ -92,6 +92,17 @@ class World {
   void set_stop_switch(bool open) { hal_.set_stop_switch(open); }
   void reset_board();
 
+  // For a board outside of this world, which is in step with it: there is none inside any more.
+  void remove_board();
+  // Its pulse for a servo has just ended; 0: there are no pulses any more.
+  void pulse(int servo, double width_us);
+  // Its sensor takes a sample now.
+  Outcome sense();
+
+  // Bit i: servo i has pulses; and how wide they are, 0 where there are none.
+  uint32_t attached() const;
+  double pulse_us(int tendon) const;
+
  private:
   int64_t board_us(int64_t world_us) const;  // on the board's own clock
   int64_t world_us(int64_t board_us) const;  // when that clock gets there
@@ -106,7 +117,6 @@ class World {
   void transmit();
   void ask_foreign();
   Top top(const Body& body) const;
-  double pulse_us(int tendon) const;
   void filament(const Top& top, Vec3& root_mm, Vec3& tip_mm) const;
   Vec3 in_world(const Vec3& point_mm) const { return arm_.position_mm(now_us_) + flip(point_mm); }
 
@@ -116,6 +126,8 @@ class World {
 
   HostHal hal_;
   std::unique_ptr<Board> board_;  // none while it boots
+  bool outside_ = false;          // the board is
+  std::array<double, kTendons> outside_us_{};
   int64_t clock_error_ppb_;
   int64_t boot_us_ = 0;  // when the board's time started, or will
   int64_t frame_ = 0;

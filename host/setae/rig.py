@@ -29,7 +29,7 @@ from setae.link.transport import Transport
 from setae.record import Recorder
 from setae.robot import Robot
 from setae.scene import Scene, tube_scene
-from setae.sim import Follower, SimTransport, SimulatedStage, World, plants, plugin
+from setae.sim import Follower, SimTransport, SimulatedStage, World, boards, plants, plugin
 from setae.stage import ManualStage, Stage
 from setae.ur import UrStage
 from setae_protocol.messages import (
@@ -227,6 +227,12 @@ def _open(
             followers.append(Follower(world, stage))
         stage = stage or SimulatedStage(world, config.stage)
         session_id: int | None = seed % 255 + 1
+    elif url is not None and "://" in url:
+        foreign = None
+        world = _world(config, scene, seed)
+        transport = boards.connect(url, world)
+        stage = stage or SimulatedStage(world, config.stage)
+        session_id = seed % 255 + 1
     else:
         world = None
         transport = SerialTransport(url or find_port())

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from setae.errors import LinkLostError
+from setae.errors import LinkLostError, SimulatorMissingError
 from setae_protocol.messages import (
     BAUD,
     PRESSURE_LSB_PER_HPA,
@@ -134,7 +134,9 @@ class HandlerTime:
 
 def _load() -> ctypes.CDLL:
     if not LIBRARY.is_file():
-        raise RuntimeError(f"{LIBRARY} is missing: run `make avr`")
+        raise SimulatorMissingError(
+            f"The simulated UNO was not built: {LIBRARY} is missing.", "Run `make avr`."
+        )
     library = ctypes.CDLL(str(LIBRARY))
     handle, cycle, size = ctypes.c_void_p, ctypes.c_uint64, ctypes.c_size_t
     signatures: dict[str, tuple[object, Sequence[object]]] = {
@@ -159,6 +161,7 @@ def _load() -> ctypes.CDLL:
         "uno_edges": (size, [handle, ctypes.POINTER(_Edge), size]),
         "uno_samples": (size, [handle, ctypes.POINTER(_Sample), size]),
         "uno_sensor_pressure": (None, [handle, cycle, ctypes.c_int32]),
+        "uno_sensor_next": (cycle, [handle]),
         "uno_sensor_rate": (None, [handle, ctypes.c_double]),
         "uno_sensor_present": (None, [handle, ctypes.c_int]),
         "uno_sensor_silent": (None, [handle, ctypes.c_int]),
@@ -190,8 +193,14 @@ class Uno:
     """
 
     def __init__(self, firmware: Path = FIRMWARE, *, pressure_hpa: float = 1013.25) -> None:
+        self._handle: int | None = None
         self._library = _load()
-        self._handle: int | None = self._library.uno_create(str(firmware).encode())
+        if not firmware.is_file():
+            raise SimulatorMissingError(
+                f"There is no firmware {firmware}.",
+                "Build it with `make firmware`, or name another ELF file.",
+            )
+        self._handle = self._library.uno_create(str(firmware).encode())
         if not self._handle:
             raise RuntimeError(self._library.uno_error().decode())
         self._data = ctypes.create_string_buffer(_ROOM)
@@ -307,6 +316,11 @@ class Uno:
         """Set what the sensor measures from a cycle on; calls must be in order of time."""
         raw = round(pressure_hpa * PRESSURE_LSB_PER_HPA)
         self._library.uno_sensor_pressure(self._handle, from_cycle, raw)
+
+    @property
+    def next_sample(self) -> int | None:
+        """The cycle at which the sensor takes its next sample; None where it takes none."""
+        return int(self._library.uno_sensor_next(self._handle)) or None
 
     def set_sensor_rate(self, relative: float) -> None:
         """Make the sensor's oscillator fast or slow."""
@@ -446,8 +460,11 @@ class AvrTransport:
                 return data, end // CYCLES_PER_US
             if self.now_us() >= deadline_us:
                 return None
-            until_us = min(deadline_us, self.now_us() + _SLICE_US)
-            self._uno.run_to(until_us * CYCLES_PER_US, stop_after_frame=True)
+            self.advance(min(deadline_us, self.now_us() + _SLICE_US))
+
+    def advance(self, until_us: int) -> None:
+        """Let the board run until then, or until a frame has come."""
+        self._uno.run_to(until_us * CYCLES_PER_US, stop_after_frame=True)
 
     def close(self) -> None:
         """Let go of the line. Closing twice is fine."""

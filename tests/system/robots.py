@@ -8,14 +8,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
+from tests.avr.robot import WorldTransport
+from tests.avr.simavr import Uno
 
-from setae.config import load
+from setae.config import Config, load
 from setae.link.events import Event, TelemetryReceived
 from setae.link.lossy import Faults, LossyTransport
 from setae.link.session import Session
 from setae.robot import Robot
 from setae.scene import Obstacle, tube_scene
-from setae.sim import SimTransport, SimulatedStage, World
+from setae.sim import SensorFault, SimTransport, SimulatedStage, World
 
 # Deep enough, in every direction that matters here, for a probe to find it.
 WALL_AHEAD = Obstacle(below_tip_mm=1.0)
@@ -36,6 +38,7 @@ class Bench:
     stage: SimulatedStage
     line: LossyTransport
     world: World
+    uno: Uno | None = None
     reports: list[TelemetryReceived] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     _hooks: list[Callable[[int], None]] = field(default_factory=list)
@@ -58,6 +61,26 @@ class Bench:
         """What the board puts out now."""
         return self.world.truth().pulse_us
 
+    def reset_board(self) -> None:
+        """Press the board's reset button."""
+        if self.uno is None:
+            self.world.reset_board()
+        else:
+            self.uno.press_reset()
+
+    def silence_sensor(self, silent: bool = True) -> None:
+        """Let the sensor answer, but measure nothing."""
+        if self.uno is None:
+            self.world.sensor_fault(SensorFault.SILENT if silent else SensorFault.NONE)
+        else:
+            self.uno.set_sensor_silent(silent)
+
+    def run_without_host(self, duration_s: float) -> None:
+        """Let time pass with nobody listening."""
+        end_us = self.line.now_us() + round(duration_s * 1e6)
+        while self.line.now_us() < end_us:
+            self.line.inner.receive(end_us)
+
     def run(self, duration_s: float) -> None:
         self.robot.session.run_for(round(duration_s * 1e6))
 
@@ -70,21 +93,28 @@ def bench(
     down: Faults | None = None,
     up: Faults | None = None,
     parameters: Mapping[str, float] | None = None,
+    config: Config | None = None,
+    back_end: str = "sim",
 ) -> Iterator[Bench]:
-    """A connected robot, relaxed, in a world of its own."""
-    config = load()
+    """A connected robot, relaxed, in a world of its own.
+
+    `back_end` "avr": its board is the built firmware in the simulated UNO.
+    """
+    config = config or load()
     scene = tube_scene(config, obstacle)
     with World(seed=seed, parameters={**dict(config.simulator), **(parameters or {})}) as world:
         world.add_tube(scene.tube_axis_mm, scene.tube_inner_radius_mm)
         if scene.box is not None:
             world.add_box(scene.box.centre_mm, scene.box.edges_mm, scene.box.yaw_rad)
         world.start()
+        uno = Uno() if back_end == "avr" else None
         line = LossyTransport(
-            SimTransport(world), seed=seed, down=down or Faults(), up=up or Faults()
-        )
+            WorldTransport(uno, world) if uno else SimTransport(world),
+            seed=seed, down=down or Faults(), up=up or Faults(),
+        )  # fmt: skip
         session = Session(line, session_id=7)
         robot = Robot(session, config)
-        made = Bench(robot, SimulatedStage(world, config.stage), line, world)
+        made = Bench(robot, SimulatedStage(world, config.stage), line, world, uno)
         session.pollables.append(made)
 
         def note(event: Event) -> None:
@@ -105,9 +135,11 @@ def compressed(
     obstacle: Obstacle | None = None,
     down: Faults | None = None,
     up: Faults | None = None,
+    back_end: str = "sim",
 ) -> Iterator[Bench]:
     """The same, enabled and compressed to 45 mm."""
-    with bench(seed=seed, obstacle=obstacle, down=down, up=up) as made:
-        made.robot.enable()
+    with bench(seed=seed, obstacle=obstacle, down=down, up=up, back_end=back_end) as made:
+        # An UNO that was just switched on does not know its pose.
+        made.robot.enable(accept_jump=True)
         made.robot.compress(45.0)
         yield made

@@ -169,6 +169,9 @@ def load() -> ctypes.CDLL:
         "supply": (status, (world, c_int)),
         "stop_switch": (status, (world, c_int)),
         "reset_board": (status, (world,)),
+        "remove_board": (status, (world,)),
+        "pulse": (status, (world, c_int, c_double)),
+        "sense": (status, (world, vector)),
     }
     for name, (result, arguments) in signatures.items():
         try:

@@ -412,6 +412,29 @@ class World:
         """Press the reset button: the board starts anew; retained memory and EEPROM survive."""
         self._change(self._library.setae_world_reset_board(self._live))
 
+    def remove_board(self) -> None:
+        """Take the board out, for one outside that is in step with this world.
+
+        From now on its pulses come by `pulse`, its sensor asks by `sense`, and no bytes pass.
+        """
+        self._change(self._library.setae_world_remove_board(self._live))
+
+    def pulse(self, servo: int, width_us: float) -> None:
+        """Tell of a pulse that has just ended; a width of 0: there are no pulses any more."""
+        self._change(self._library.setae_world_pulse(self._live, servo, width_us))
+
+    def sense(self) -> float:
+        """Move the plant up to now, and return the pressure of a sample that is taken now, in hPa.
+
+        Raises
+        ------
+        SimulationError
+            The plant has no solution.
+        """
+        pressure_hpa = ctypes.c_double()
+        self._change(self._library.setae_world_sense(self._live, ctypes.byref(pressure_hpa)))
+        return pressure_hpa.value
+
     def close(self) -> None:
         """Let go of the world. Closing twice is fine."""
         if self._handle:

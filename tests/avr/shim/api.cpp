@@ -143,6 +143,11 @@ void uno_sensor_pressure(Uno* uno, uint64_t from, int32_t raw) {
   uno->sensor().set_pressure(from, raw);
 }
 
+// When the sensor takes its next sample; 0: it takes none.
+uint64_t uno_sensor_next(Uno* uno) {
+  return uno->sensor().next_sample();
+}
+
 void uno_sensor_rate(Uno* uno, double relative) {
   uno->sensor().set_rate(relative);
 }

@@ -55,6 +55,11 @@ void Lps33hw::keep_sampling() {
     next_sample_.set(static_cast<Cycle>(llround(due_)));
 }
 
+Cycle Lps33hw::next_sample() const {
+  const bool samples = kRatesHz[(registers_[kCtrlReg1] >> 4) & 7] != 0;
+  return samples ? static_cast<Cycle>(llround(due_)) : 0;
+}
+
 void Lps33hw::clear() {
   memset(registers_, 0, sizeof(registers_));
   registers_[kCtrlReg2] = kAutoIncrement;

@@ -41,6 +41,8 @@ class Lps33hw {
   void set_rate(double relative) { rate_ = relative; }
   // The pressure from that cycle on.
   void set_pressure(Cycle from, int32_t raw);
+  // When it takes the next sample; 0: it takes none.
+  Cycle next_sample() const;
   // Samples that became ready.
   std::vector<PressureSample>& samples() { return samples_; }
 

@@ -1,0 +1,97 @@
+"""The same robot on the simulator of every day, and on the built firmware in the simulated UNO."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.avr.built import require_built
+from tests.system.robots import WALL_AHEAD, bench, compressed
+
+from setae.config import loads
+from setae.errors import BoardResetError, FaultError, StoppedError
+from setae.experiments.explore import Event, explore
+from setae.link.lossy import Faults
+from setae.scene import Obstacle
+from setae_protocol.messages import State
+
+TARGET_MM = (15.0, 0.0, 60.0)
+BAD_LINE = Faults(lose=0.1, double=0.1, damage=0.1, delay=0.1)
+
+
+@pytest.fixture(params=["sim", "avr"])
+def back_end(request: pytest.FixtureRequest) -> str:
+    if request.param == "avr":
+        require_built()
+    return str(request.param)
+
+
+def test_it_moves_where_it_is_told_and_relaxes(back_end: str) -> None:
+    with compressed(back_end=back_end) as made:
+        made.robot.move_to(TARGET_MM, duration_s=0.6)
+        made.run(0.1)
+        assert made.robot.position_mm == pytest.approx(TARGET_MM, abs=0.1)
+        assert made.pulses_us() == pytest.approx(np.array(made.robot.telemetry.pulse_ticks) / 2)
+        made.robot.relax()
+        made.run(0.1)
+        assert made.robot.state is State.RELAXED
+        assert made.world.truth().attached == (False,) * 4
+        assert made.world.truth().backbone_mm[-1, 2] > 65.0
+
+
+def test_a_touch_stops_it_and_it_comes_back(back_end: str) -> None:
+    with compressed(back_end=back_end, obstacle=WALL_AHEAD) as made:
+        start = made.robot.telemetry.pulse_ticks
+        truths = []
+        made.robot.session.subscribe(lambda _: truths.append(made.world.truth()))
+        contact = made.robot.probe(TARGET_MM, duration_s=1.0)
+        assert contact is not None
+        touching = next(truth for truth in truths if truth.contact_depth_mm > 0)
+        assert abs(contact.time_us - touching.time_us) < 60_000
+        assert made.robot.state is State.HOLDING
+        assert made.robot.telemetry.pulse_ticks == start
+
+
+def test_a_stop_holds_on_a_bad_line_until_resume(back_end: str) -> None:
+    with compressed(back_end=back_end, seed=3, down=BAD_LINE, up=BAD_LINE) as made:
+        robot = made.robot
+        made.at(robot.now_us + 300_000, robot.session.send_stop)
+        with pytest.raises(StoppedError):
+            robot.move_to(TARGET_MM, duration_s=1.5)
+        made.run(0.2)
+        held = made.pulses_us()
+        made.run(1.5)
+        assert robot.state is State.STOPPED
+        assert made.pulses_us() == pytest.approx(held)
+        robot.resume()
+        robot.move_to(TARGET_MM, duration_s=0.6)
+        assert robot.position_mm == pytest.approx(TARGET_MM, abs=0.1)
+
+
+def test_a_silent_sensor_under_guard_is_a_fault(back_end: str) -> None:
+    with compressed(back_end=back_end) as made:
+        made.at(made.robot.now_us + 600_000, made.silence_sensor)
+        with pytest.raises(FaultError, match="sensor"):
+            made.robot.probe(TARGET_MM, duration_s=1.5)
+        made.silence_sensor(False)
+        made.run(0.5)
+        made.robot.resume()
+        assert made.robot.state is State.HOLDING
+
+
+def test_a_reset_in_mid_move_is_noticed_and_nothing_goes_on(back_end: str) -> None:
+    with compressed(back_end=back_end) as made:
+        made.at(made.robot.now_us + 300_000, made.reset_board)
+        with pytest.raises(BoardResetError):
+            made.robot.move_to((0.0, 0.0, 65.0), duration_s=2.0)
+        made.run_without_host(0.5)
+        assert made.world.truth().attached == (False,) * 4
+
+
+def test_it_finds_what_is_in_the_tube(back_end: str) -> None:
+    config = loads("[explore]\nsteps = 1\ndirections = 2\nextend_duration_s = 0.6")
+    with bench(back_end=back_end, config=config, obstacle=Obstacle(below_tip_mm=15.0)) as made:
+        made.robot.enable(accept_jump=True)
+        events: list[Event] = []
+        explore(made.robot, made.stage, on_event=events.append)
+        levels = [event.data for event in events if event.name == "level_end"]
+        assert [level["touched_deg"] for level in levels] == [[0.0]]
