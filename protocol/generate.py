@@ -1,4 +1,4 @@
-"""Write everything that follows from `setae_protocol/schema.py` and the default robot.
+"""Write everything that follows from the schema, the state table and the default robot.
 
     python protocol/generate.py            write the generated files
     python protocol/generate.py --check    fail where one of them differs
@@ -19,6 +19,7 @@ from generator.layout import check_schema
 from generator.limits import default_limits_header
 from generator.page import reference_page
 from generator.python import python_module
+from generator.states import model_table, states_page
 from generator.vectors import vectors_header, vectors_json
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -29,13 +30,15 @@ OUTPUTS: dict[str, Callable[[], str]] = {
     "protocol/REFERENCE.md": reference_page,
     "protocol/vectors.json": vectors_json,
     "tests/firmware/test_protocol/vectors.h": vectors_header,
+    "protocol/STATES.md": states_page,
+    "tests/model/table.h": model_table,
     # Last: it needs the host package, which needs the messages.
     "firmware/lib/board/src/board/default_limits.h": default_limits_header,
 }
 
 
 def drift(root: Path) -> list[str]:
-    """One line for each generated file that differs from what the schema gives."""
+    """One line for each generated file that differs from what its source gives."""
     lines = []
     for name, make in OUTPUTS.items():
         path = root / name
@@ -47,7 +50,7 @@ def drift(root: Path) -> list[str]:
             changed = difflib.unified_diff(old.splitlines(), new.splitlines(), lineterm="", n=0)
             first = next(line for line in list(changed)[3:])
             lines.append(
-                f"{name} is not what the schema gives; run: python protocol/generate.py"
+                f"{name} is not what its source gives; run: python protocol/generate.py"
                 f" (first difference: {first})"
             )
     return lines
