@@ -22,6 +22,8 @@ NATIVE_SOURCES := CMakeLists.txt $(shell find firmware/lib simulator -name '*.cp
 AVR_LIBRARY := build/avr/libuno.so
 AVR_SOURCES := $(wildcard tests/avr/shim/*.cpp tests/avr/shim/*.h)
 AVR_PACKAGES := libsimavr-dev libelf-dev
+# The model checker; it compiles what it makes.
+MODEL_PACKAGES := spin gcc
 FUZZ_PACKAGES := clang libclang-rt-dev
 # The generator writes its own style.
 CPP_SOURCES = $(shell find firmware simulator tests -name '*.cpp' -o -name '*.h' \
@@ -101,7 +103,7 @@ pictures: .venv/.installed ## run the exploration, and draw the documentation's 
 # In this order, so that what fails fastest comes first and pytest's count comes last.
 .PHONY: test
 test: ## check everything: style, types, drift, firmware, wheel, pages, behaviour
-	@.ci/need --install python compiler $(AVR_PACKAGES) $(FUZZ_PACKAGES)
+	@.ci/need --install python compiler $(AVR_PACKAGES) $(MODEL_PACKAGES) $(FUZZ_PACKAGES)
 	@$(PIO) --version # sets PlatformIO up: what that lacks is said first, not after minutes
 	@$(MAKE) --no-print-directory lint
 	@$(MAKE) --no-print-directory drift
@@ -143,9 +145,14 @@ firmware: ## build the firmware for the UNO, and check its size
 wheel: .venv/.dev ## build sdist and wheel, and run what they install outside the tree
 	$(BIN)/python .ci/wheel.py
 
+.PHONY: model
+model: .venv/.dev ## check the model of link and states whole, and count its states (minutes)
+	@.ci/need $(MODEL_PACKAGES)
+	$(BIN)/python -m tests.model.checker
+
 .PHONY: pytest
 pytest: .venv/.dev firmware $(AVR_LIBRARY) ## the Python tests
-	@.ci/need $(FUZZ_PACKAGES)
+	@.ci/need $(MODEL_PACKAGES) $(FUZZ_PACKAGES)
 	$(BIN)/python -m pytest
 
 .PHONY: fuzz

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # The oracle that judges explorations is the tests' own.
 sys.path.insert(0, str(ROOT))
 
-from bench import arm, avr_figures, damage, elf, kinematics, line, motion  # noqa: E402  # needs the path
+from bench import arm, avr_figures, damage, elf, kinematics, line, link_model, motion  # noqa: E402  # needs the path
 from bench.figure import Figure  # noqa: E402
 from tests.system import oracle  # noqa: E402
 
@@ -252,6 +252,7 @@ FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     **line.FIGURES,
     **arm.FIGURES,
     **damage.FIGURES,
+    **link_model.FIGURES,
     "random_obstacles": random_obstacles,
     "kinematics_speed": kinematics_speed,
     "motion_segments": motion_segments,

@@ -117,13 +117,21 @@ def states_page() -> str:
     """Return the page that shows the table."""
     table = state_table()
     modes = list(table.modes)
+    introduction = (
+        "The board asks one table what it may do. Here it is, as the firmware has it; what it is"
+        " for, in the [README](README.md)."
+    )
+    legend = (
+        "A **bold** word is the next mode, *italics* are the reason for which a command is refused,"
+        " · means that nothing changes. An empty cell can't happen: where it did all the same, the"
+        " board would take it for an internal fault."
+    )
     lines = [
         "# States of the board",
         "",
         f"<!-- {_PREAMBLE} -->",
         "",
-        "The board asks one table what it may do. Here it is, as the firmware has it; what it is"
-        " for, in the [README](README.md).",
+        introduction,
         "",
         "## Modes",
         "",
@@ -140,9 +148,7 @@ def states_page() -> str:
         "",
         "## Events",
         "",
-        "A **bold** word is the next mode, *italics* are the reason for which a command is refused,"
-        " · means that nothing changes. An empty cell can't happen: where it did all the same, the"
-        " board would take it for an internal fault.",
+        legend,
         "",
         "| Event | " + " | ".join(modes) + " |",
         "|---|" + "---|" * len(modes),

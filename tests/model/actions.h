@@ -114,6 +114,19 @@ static int board_alone(World* w, int action) {
         return 0;
       b->sensor_bad = 0;
       break;
+    case DO_board_is_switched_off:
+      if (w->switches == limits.switches || b->switch_open)
+        return 0;
+      ++w->switches;
+      b->switch_open = 1;
+      board_switched_off(b);
+      w->latched = 1;
+      break;
+    case DO_board_is_switched_on:
+      if (!b->switch_open)
+        return 0;
+      b->switch_open = 0;
+      break;
     case DO_board_resets:
       if (w->resets == limits.resets)
         return 0;
@@ -121,7 +134,6 @@ static int board_alone(World* w, int action) {
       board_reset(b);
       ++w->era;
       w->latched = w->enabled = 0;
-      memset(w->heard, 0, sizeof w->heard);
       memset(w->down, 0, sizeof w->down);  // a board that starts is deaf
       break;
     default:
@@ -172,7 +184,7 @@ static int act(World* w, int action) {
       return 1;
     default:
       return action <= DO_user_sends_bad_segments ? host_commands(w, ENABLE + action)
-                                               : board_alone(w, action);
+                                                  : board_alone(w, action);
   }
 }
 
@@ -224,9 +236,9 @@ static int settled(const World* w) {
 
 // One round trip: nothing is lost, time passes on both sides.
 static void fair_round(World* w) {
-  static const Byte alone[] = {DO_board_attached,  DO_board_tared,     DO_board_played,
-                               DO_board_unwound,   DO_board_retracted, DO_sensor_recovers,
-                               DO_board_begins_frame};
+  static const Byte alone[] = {DO_board_attached,       DO_board_tared,       DO_board_played,
+                               DO_board_unwound,        DO_board_retracted,   DO_sensor_recovers,
+                               DO_board_is_switched_on, DO_board_begins_frame};
   unsigned i;
   if (w->host.phase == FAILED)
     next_host(w);
@@ -286,9 +298,10 @@ __attribute__((noinline)) static int settles(const World* w) {
 // What the environment asks for: SETAE_MODEL holds the plant and the limits, in their order.
 static void read_scope(void) {
   const char* text = getenv("SETAE_MODEL");
-  int* const values[] = {&plant,          &limits.commands, &limits.stops,     &limits.trips,
-                         &limits.faults,  &limits.resets,   &limits.hosts,     &limits.eras,
-                         &limits.kinds,   &limits.handshake, &limits.holding,  &limits.late};
+  int* const values[] = {&plant,         &limits.commands, &limits.stops,     &limits.trips,
+                         &limits.faults, &limits.resets,   &limits.switches,  &limits.hosts,
+                         &limits.eras,   &limits.kinds,    &limits.handshake, &limits.holding,
+                         &limits.late};
   unsigned i;
   for (i = 0; text && i < sizeof values / sizeof values[0]; ++i) {
     char* end;

@@ -8,17 +8,17 @@
 
 enum {
   NO_PLANT,
-  PLANT_OLD_COMMAND_AGAIN,      // a repeat is carried out again
-  PLANT_GAP_ACCEPTED,           // a command after a lost one is taken
-  PLANT_EPOCH_IGNORED,          // segments of an old epoch are queued
+  PLANT_OLD_COMMAND_AGAIN,  // a repeat is carried out again
+  PLANT_GAP_ACCEPTED,       // a command after a lost one is taken
+  PLANT_EPOCH_IGNORED,      // segments of an old epoch are queued
   PLANT_RESUME_OF_ANY_EPOCH,
   PLANT_STOP_KEEPS_QUEUE,
   PLANT_STOP_NEEDS_SESSION,
-  PLANT_STOP_UNLATCHED,         // table: a stop of what plays leads to holding
-  PLANT_PLAY_WHEN_STOPPED,      // table: segments are taken while stopped
-  PLANT_DEAD_END,               // table: no resume after a stop
-  PLANT_RESUME_SWITCHES_ON,     // table: a resume without pulses leads to holding
-  PLANT_CELL_MISSING,           // table: the queue has something, but holding does not play
+  PLANT_STOP_UNLATCHED,      // table: a stop of what plays leads to holding
+  PLANT_PLAY_WHEN_STOPPED,   // table: segments are taken while stopped
+  PLANT_DEAD_END,            // table: no resume after a stop
+  PLANT_RESUME_SWITCHES_ON,  // table: a resume without pulses leads to holding
+  PLANT_CELL_MISSING,        // table: the queue has something, but holding does not play
   PLANT_LIMP_KEEPS_PULSES,
   PLANT_REFUSAL_OVERWRITTEN,
   PLANT_RECORD_ONCE,  // a record is never sent again
@@ -80,10 +80,10 @@ typedef struct {
 
 typedef struct {
   Byte mode, epoch, session, expected;
-  Byte attached, queued, guard, sensor_bad;
+  Byte attached, queued, guard, sensor_bad, switch_open;
   Byte stop_known, stop_number, stop_session;
   Byte receipt, hello, token, pong, pong_token, telemetry;  // what is to be sent
-  Byte guard_sequence, guard_command;  // of the guard that is on
+  Byte guard_sequence, guard_command;                       // of the guard that is on
   Byte never;  // the table was asked what it says never happens
   Latch latch[LATCHES];
 } Board;
@@ -151,11 +151,16 @@ static void refuse(Board* b, const Down* m) {
   happen(b, EVENT_MOTION_REFUSED);
 }
 
+static int record_pending(const Board* b) {
+  return b->latch[TRIP].pending || b->latch[FAULT].pending;
+}
+
 static int resume(Board* b, const Down* m) {
   if (m->epoch != b->epoch && plant != PLANT_RESUME_OF_ANY_EPOCH)
     return REFUSED;
-  if ((b->mode == MODE_TRIPPED && b->latch[TRIP].pending) ||
-      (b->mode == MODE_FAULT && (b->latch[FAULT].pending || b->sensor_bad)))
+  if (record_pending(b) && b->mode != MODE_REFLEX)
+    return REFUSED;
+  if ((b->mode == MODE_FAULT && b->sensor_bad) || b->switch_open)
     return REFUSED;
   return happen(b, b->attached == DETACHED   ? EVENT_RESUME_DETACHED
                    : b->attached == ATTACHED ? EVENT_RESUME_ATTACHED
@@ -178,7 +183,7 @@ static int segments(Board* b, const Down* m) {
 static int guard(Board* b, const Down* m) {
   if (m->epoch != b->epoch)
     return DISCARDED;
-  if (!allows(b, EVENT_GUARD) || b->queued || b->latch[TRIP].pending || b->sensor_bad)
+  if (!allows(b, EVENT_GUARD) || b->queued || b->sensor_bad)
     return REFUSED;
   b->guard = GUARD_TARING;
   b->guard_sequence = m->sequence;
@@ -189,7 +194,7 @@ static int guard(Board* b, const Down* m) {
 static int decide(Board* b, const Down* m) {
   switch (m->kind) {
     case ENABLE:
-      if (!allows(b, EVENT_ENABLE))
+      if (!allows(b, EVENT_ENABLE) || record_pending(b))
         return REFUSED;
       b->attached = PARTLY;
       return happen(b, EVENT_ENABLE);
@@ -307,10 +312,20 @@ static void board_trip(Board* b, int retract) {
     latch(b, TRIP, 0);
 }
 
+static void board_switched_off(Board* b) {
+  if (b->mode == MODE_STOPPED || b->mode == MODE_FAULT)
+    return;
+  drop_plans(b);
+  happen(b, EVENT_STOP);
+}
+
 static void board_fault(Board* b) {
   drop_plans(b);
   happen(b, EVENT_FAULT);
-  latch(b, FAULT, 0);
+  if (b->latch[FAULT].pending)
+    b->latch[FAULT].repeat = 1;  // it counts one more
+  else
+    latch(b, FAULT, 0);
 }
 
 static void board_tared(Board* b) {
@@ -357,10 +372,16 @@ static void board_frame(Board* b) {
 
 static void board_reset(Board* b) {
   static const Board kNew;
-  const Byte session = b->session;
-  const Byte sensor_bad = b->sensor_bad;
+  const Board before = *b;
+  int which;
   *b = kNew;
-  b->sensor_bad = sensor_bad;
+  b->sensor_bad = before.sensor_bad;
+  b->switch_open = before.switch_open;
+  for (which = 0; which < LATCHES; ++which) {
+    b->latch[which] = before.latch[which];
+    b->latch[which].repeat = b->latch[which].pending;
+    b->latch[which].recalled = 0;
+  }
   if (plant == PLANT_RESET_KEEPS_SESSION)
-    b->session = session;
+    b->session = before.session;
 }

@@ -1,7 +1,7 @@
 """Run the model in Spin: scope by scope, whole or with an error planted.
 
-    python -m tests.model.checker            all scopes, and the number of states
-    python -m tests.model.checker --small    those of the tests
+python -m tests.model.checker            all scopes, and the number of states
+python -m tests.model.checker --small    those of the tests
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Scope:
         What it is for.
     kinds
         The commands that the user may send, in any order.
-    commands, stops, trips, faults, resets, hosts
+    commands, stops, trips, faults, resets, switches, hosts
         How often. With `holding` the enable at the start is one of the commands.
     eras
         How often the epoch may change, the session's start included.
@@ -53,6 +53,7 @@ class Scope:
     trips: int = 0
     faults: int = 0
     resets: int = 0
+    switches: int = 0
     hosts: int = 1
     eras: int = 4
     handshake: bool = False
@@ -64,7 +65,8 @@ class Scope:
         """What the model reads from its environment, after the plant."""
         kinds = sum(1 << COMMANDS.index(kind) for kind in self.kinds)
         values = (
-            self.commands, self.stops, self.trips, self.faults, self.resets, self.hosts,
+            self.commands, self.stops, self.trips, self.faults, self.resets, self.switches,
+            self.hosts,
             self.eras, kinds, self.handshake, self.holding, self.late,
         )  # fmt: skip
         return " ".join(str(int(value)) for value in values)
@@ -117,9 +119,7 @@ class Model:
         if shortest:
             options.append("-DBFS")
         for command in (["spin", "-a", "model.pml"], ["cc", *options, "-o", "pan", "pan.c"]):
-            done = subprocess.run(
-                command, cwd=folder, capture_output=True, text=True, check=False
-            )
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
             if done.returncode != 0:
                 raise RuntimeError(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
 
@@ -191,12 +191,20 @@ WHOLE = (
         commands=2, stops=2, holding=True, eras=5,
     ),
     Scope(
-        name="trip", what="a guarded move, and a contact at any moment",
-        kinds=("segments", "guard", "resume"), commands=3, trips=1, holding=True,
+        name="contact", what="a guarded move, and a contact at any moment",
+        kinds=("segments", "guard"), commands=3, trips=1, holding=True, eras=3,
+    ),
+    Scope(
+        name="trip", what="a guard, a trip at any moment, a resume", kinds=("guard", "resume"),
+        commands=3, trips=1, holding=True, eras=3,
     ),
     Scope(
         name="fault", what="a guard, and a fault at any moment", kinds=("guard", "resume"),
         commands=2, stops=1, faults=1, holding=True,
+    ),
+    Scope(
+        name="switch", what="segments, and the stop switch", kinds=("segments", "resume"),
+        commands=2, switches=1, holding=True,
     ),
     Scope(
         name="handshake", what="a session that opens, and a stop meanwhile",

@@ -19,10 +19,10 @@ typedef struct {
 
 typedef struct {
   Byte kind, sequence, epoch, command, era;
-  Byte sent_clean;   // no board frame was lost since it was sent
-  Byte acked;        // the board has taken it
-  Byte end;          // what it will count as
-  Byte clean;        // telemetry without a loss since then
+  Byte sent_clean;  // no board frame was lost since it was sent
+  Byte acked;       // the board has taken it
+  Byte end;         // what it will count as
+  Byte clean;       // telemetry without a loss since then
   Byte done;
 } Ticket;
 
@@ -34,7 +34,7 @@ typedef struct {
   Byte missed;  // a frame whose number it did not note
   Byte next_sequence;
   Byte stop_under_way, stop_number, stop_shown_known, stop_shown, stop_user;
-  Byte seen[LATCHES];  // ids that were told, a bit each
+  Byte seen[LATCHES];         // ids that were told, a bit each
   Ticket recent[REMEMBERED];  // oldest first; kind 0: none
 } Host;
 

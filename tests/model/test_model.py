@@ -7,9 +7,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from tests.model.checker import SMALL, Model, Scope, plants
 
 from generator.states import state_table
-from tests.model.checker import SMALL, Model, Scope, plants
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -84,11 +84,11 @@ def test_the_table_is_the_firmwares_byte_by_byte(tmp_path: Path) -> None:
     for e, (event, row) in enumerate(table.cells.items()):
         for m, (mode, byte) in enumerate(zip(table.modes, row, strict=True)):
             cell = f"state_table::kCells[int(Event::{_camel(event)})][int(Mode::{_camel(mode)})]"
-            lines.append(f"static_assert({cell} == {byte}, \"\");")
-            lines.append(f"static_assert(int(Event::{_camel(event)}) == {e}, \"\");")
-            lines.append(f"static_assert(int(Mode::{_camel(mode)}) == {m}, \"\");")
+            lines.append(f'static_assert({cell} == {byte}, "");')
+            lines.append(f'static_assert(int(Event::{_camel(event)}) == {e}, "");')
+            lines.append(f'static_assert(int(Mode::{_camel(mode)}) == {m}, "");')
     lines += [
-        f"static_assert(state_of(Mode::{_camel(mode)}) == protocol::State::{_camel(state)}, \"\");"
+        f'static_assert(state_of(Mode::{_camel(mode)}) == protocol::State::{_camel(state)}, "");'
         for mode, state in table.states.items()
     ]
     source = tmp_path / "table.cpp"

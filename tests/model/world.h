@@ -9,7 +9,7 @@
 
 // How much may happen in a run.
 typedef struct {
-  int commands, stops, trips, faults, resets;
+  int commands, stops, trips, faults, resets, switches;
   int hosts;      // one after the other
   int eras;       // changes of the epoch, the one at the session's start included
   int kinds;      // of commands, a bit each, from ENABLE on
@@ -17,17 +17,18 @@ typedef struct {
   int holding;    // 1: the servos are on at the start
   int late;       // 1: frames to the host may come late
 } Limits;
-static Limits limits = {2, 1, 0, 0, 0, 1, 4, 0xFF, 0, 0, 0};
+static Limits limits = {2, 1, 0, 0, 0, 0, 1, 4, 0xFF, 0, 0, 0};
 
 enum { DOWN_SLOTS = 2, UP_SLOTS = 1, COMMANDS_MAX = 8, HOSTS_MAX = 6 };
 enum { ROUNDS = 24 };  // of a fair line, until all must have arrived
 
 // What must not happen.
-#define WRONGS(X) \
-  X(ALL_RIGHT) X(MOVES_WITHOUT_ENABLE) X(MOVES_THOUGH_LATCHED) X(OLD_EPOCH_QUEUED) \
-  X(RESUMED_BLINDLY) X(STOP_IGNORED) X(STOP_CONFIRMED_TOO_EARLY) X(TWICE_OR_OUT_OF_ORDER) \
-  X(WRONG_VERDICT) X(RECORD_LOST) X(RECORD_TWICE) X(TABLE_SAYS_NEVER) X(INCONSISTENT) \
-  X(NOT_DELIVERED) X(DEAD_END)
+#define WRONGS(X)                                                                             \
+  X(ALL_RIGHT)                                                                                \
+  X(MOVES_WITHOUT_ENABLE) X(MOVES_THOUGH_LATCHED) X(OLD_EPOCH_QUEUED) X(RESUMED_BLINDLY)      \
+      X(STOP_IGNORED) X(STOP_CONFIRMED_TOO_EARLY) X(TWICE_OR_OUT_OF_ORDER) X(WRONG_VERDICT)   \
+          X(RECORD_LOST) X(RECORD_TWICE) X(TABLE_SAYS_NEVER) X(INCONSISTENT) X(NOT_DELIVERED) \
+              X(DEAD_END)
 #define NAME(wrong) wrong,
 enum { WRONGS(NAME) };
 #undef NAME
@@ -43,7 +44,7 @@ typedef struct {
   Byte up_count, up_lost;
 
   // How often it happened.
-  Byte commands, stops, trips, faults, resets, hosts;
+  Byte commands, stops, trips, faults, resets, switches, hosts;
 
   // The judge's.
   Byte era;  // rises with the epoch, and with a reset
@@ -132,16 +133,6 @@ static void take_up(World* w, int lost) {
 static void report(World* w) {
   Board* b = &w->board;
   int which;
-  if (b->hello) {
-    if (!send_up(w, HELLO_REPLY, b->token, 0, 0))
-      return;
-    b->hello = b->token = 0;
-  }
-  if (b->receipt) {
-    if (!send_up(w, RECEIPT, 0, 0, 0))
-      return;
-    b->receipt = 0;
-  }
   for (which = 0; which < LATCHES; ++which) {
     Latch* l = &b->latch[which];
     if (!l->recalled && !(l->repeat && b->session))
@@ -150,13 +141,23 @@ static void report(World* w) {
       return;
     l->recalled = l->repeat = 0;
   }
-  if (b->pong) {
-    if (!send_up(w, PONG, b->pong_token, 0, 0))
+  if (b->telemetry) {
+    if (!send_up(w, TELEMETRY, b->stop_number, 0, 0))
       return;
-    b->pong = b->pong_token = 0;
-  }
-  if (b->telemetry && send_up(w, TELEMETRY, b->stop_number, 0, 0))
     b->telemetry = 0;
+  }
+  if (b->receipt) {
+    if (!send_up(w, RECEIPT, 0, 0, 0))
+      return;
+    b->receipt = 0;
+  }
+  if (b->hello) {
+    if (!send_up(w, HELLO_REPLY, b->token, 0, 0))
+      return;
+    b->hello = b->token = 0;
+  }
+  if (b->pong && send_up(w, PONG, b->pong_token, 0, 0))
+    b->pong = b->pong_token = 0;
 }
 
 // --------------------------------------------------------------------------- the board
@@ -190,7 +191,7 @@ static void judge_board(World* w, const Board* before) {
     const Latch* l = &b->latch[which];
     if (l->id && !l->pending && w->heard[which] < l->id)
       blame(w, RECORD_LOST);
-    if (which == REFUSAL && l->id > 1 && w->heard[which] + 1 < l->id)
+    if (l->id > 1 && w->heard[which] + 1 < l->id)
       blame(w, RECORD_LOST);  // overwritten before anybody had it
   }
   if (b->attached == DETACHED)
