@@ -94,8 +94,8 @@ def stops(count: int, seed: int) -> list[Freeze]:
         for _ in range(count):
             uno.set_sensor_rate(rng.uniform(1 - RATE_SPREAD, 1 + RATE_SPREAD))
             _start_ramp(driver)
-            driver.session.run_for(60_000)
-            uno.run_for_us(rng.uniform(0, 20_000))
+            # The load goes on meanwhile: what lies ahead on the line is the same at each phase.
+            driver.session.run_for(round(rng.uniform(60_000, 100_000)))
             driver.session.send_stop()
             arrived = uno.line_free
             driver.wait_for(State.STOPPED)
@@ -145,8 +145,7 @@ def commands(count: int, seed: int) -> list[Command]:
         pose = _LOW
         for _ in range(count):
             uno.set_sensor_rate(rng.uniform(1 - RATE_SPREAD, 1 + RATE_SPREAD))
-            driver.session.run_for(40_000)
-            uno.run_for_us(rng.uniform(0, 20_000))
+            driver.session.run_for(round(rng.uniform(40_000, 80_000)))
             driver.forget()
             pose = _another(rng, pose)
             driver.queue([pose])
