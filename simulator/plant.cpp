@@ -11,6 +11,8 @@ constexpr int kPatience = 6;           // iterations before the secant is built 
 constexpr double kLongestStep = 4;     // root of N mm; half the spring's whole compression
 constexpr double kSecantStep = 1e-4;   // root of N mm
 constexpr double kCreep = 1e-4;        // root of N mm a step
+constexpr double kLargestShift = 1e6;
+constexpr double kNudge = 1e-3;        // root of N mm; moves the tip by 0.02 mm or so
 constexpr double kSolidPenalty = 100;  // times the spring's axial stiffness
 constexpr double kRounding_per_mm = 0.003;
 
@@ -78,7 +80,41 @@ void Plant::step(const std::array<double, kTendons>& lengths_mm, double duration
   for (int m = 0; m < rod_.modes(); ++m) {
     moved = std::max(moved, std::fabs(state_.modes[m] - anchor_[m]));
   }
-  creeping_ = moved > kCreep;
+  creeping_ = moved > kCreep || leave_saddle();
+}
+
+// Rest at a point from which the energy falls is no rest: whoever is exactly in the
+// middle between two ways would stay there for ever. Pushes it off, always to the same
+// side; the next steps take it on. False where the rest is one.
+bool Plant::leave_saddle() {
+  const double damping = damping_;
+  damping_ = 0;
+  Cholesky solver;
+  bool stable = solver.factor(hessian(state_), rod_.modes(), 0);
+  if (!stable) {  // or the secant is not up to date
+    rebuild_secant();
+    stable = solver.factor(hessian(state_), rod_.modes(), 0);
+  }
+  if (!stable) {
+    for (double shift = 0.25; !solver.factor(hessian(state_), rod_.modes(), shift); shift *= 2) {
+      if (!(shift < kLargestShift))
+        break;
+    }
+    Modes way;
+    way.fill(1);  // inverse iteration: towards the lowest curvature
+    for (int k = 0; k < 8; ++k) {
+      way = solver.solve(way);
+      const double size = length(way);
+      for (double& part : way)
+        part /= size;
+    }
+    Modes modes = state_.modes;
+    for (int m = 0; m < rod_.modes(); ++m)
+      modes[m] += kNudge * way[m];
+    evaluate(modes, state_);
+  }
+  damping_ = damping;
+  return !stable;
 }
 
 // Energy and gradient at `modes`. state.paths should hold nearby paths already.

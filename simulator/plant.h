@@ -89,6 +89,7 @@ class Plant {
 
   void evaluate(const Modes& modes, State& state);
   void solve();
+  bool leave_saddle();
   void settle_friction(State& state);
   void add_weight(State& state) const;
   bool solid_contact(const Strain& strain, SolidContact& contact) const;
