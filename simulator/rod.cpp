@@ -6,20 +6,17 @@ namespace {
 
 enum Component { kBendX, kBendY, kTwist, kShearX, kShearY, kAxial };
 
-constexpr int kOrders[kComponents] = {3, 3, 1, 2, 2, 2};
+constexpr int kOrders[kComponents] = {4, 4, 2, 4, 4, 3};
 
 double legendre(int order, double u) {  // on 0..1
   const double x = 2 * u - 1;
-  switch (order) {
-    case 0:
-      return 1;
-    case 1:
-      return x;
-    case 2:
-      return 0.5 * (3 * x * x - 1);
-    default:
-      return 0.5 * x * (5 * x * x - 3);
+  double before = 1, value = order > 0 ? x : 1;
+  for (int n = 2; n <= order; ++n) {
+    const double next = ((2 * n - 1) * x * value - (n - 1) * before) / n;
+    before = value;
+    value = next;
   }
+  return value;
 }
 
 // Exponential of a twist in SE(3): an element of constant strain.
