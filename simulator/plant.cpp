@@ -7,10 +7,10 @@ namespace sim {
 namespace {
 
 constexpr int kIterations = 40;
-constexpr int kPatience = 6;           // iterations before the secant is built afresh
-constexpr double kLongestStep = 4;     // root of N mm; half the spring's whole compression
-constexpr double kSecantStep = 1e-4;   // root of N mm
-constexpr double kCreep = 1e-4;        // root of N mm a step
+constexpr int kPatience = 6;          // iterations before the secant is built afresh
+constexpr double kLongestStep = 4;    // root of N mm; half the spring's whole compression
+constexpr double kSecantStep = 1e-4;  // root of N mm
+constexpr double kCreep = 1e-4;       // root of N mm a step
 constexpr double kLargestShift = 1e6;
 constexpr double kNudge = 1e-3;        // root of N mm; moves the tip by 0.02 mm or so
 constexpr double kSolidPenalty = 100;  // times the spring's axial stiffness

@@ -207,7 +207,7 @@ def test_energy_and_mirror(make_driver: MakeDriver) -> None:
         for u in np.linspace(0, 1, 13)[1:]:
             now = driver.pull(start + u * (np.array(end) - start), 0.1, 0.1)
             wound_mm = before.servo_length_mm - now.servo_length_mm
-            done = 0.5 * (before.tension_n + now.tension_n) @ wound_mm
+            done = float(0.5 * (before.tension_n + now.tension_n) @ wound_mm)
             work, exchanged, before = work + done, exchanged + abs(done), now
     assert abs(work) < 0.01 * exchanged
     left = driver.pull((54.0, 48.0, 58.0, 64.0)).backbone_mm[-1]
