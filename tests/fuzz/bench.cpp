@@ -33,7 +33,9 @@ Bench::Bench() {
   restart(protocol::ResetCause::kPowerOn);
 }
 
-void Bench::restart(protocol::ResetCause cause) {
+void Bench::restart(protocol::ResetCause cause, bool powered_off) {
+  if (powered_off)
+    machine.forget_retained();
   machine.restart(cause);
   machine.begin_frame_at_call(0);
   board_.reset(new Board(machine));
@@ -43,7 +45,7 @@ void Bench::restart(protocol::ResetCause cause) {
   motion_.on_restart();
   state_.on_restart();
   contact_.on_restart();
-  line_.on_restart();
+  line_.on_restart(powered_off);
   listening_ = true;
   board_->poll();
   shot_ = BoardProbe::look(*board_);
@@ -54,7 +56,9 @@ void Bench::sample(uint64_t now_us) {
   if (sensor != protocol::Sensor::kOk) {
     machine.push_sample(sensor, 0, now_us);
   } else if (now_us >= sample_due_us_ && !sensor_silent) {
-    machine.push_sample(sensor, pressure_raw, now_us);
+    const uint32_t number = sensor_stuck ? 0 : ++samples_;
+    const int32_t swing_raw = (number & 1) != 0 ? this->swing_raw : 0;
+    machine.push_sample(sensor, (pressure_raw + swing_raw) ^ (number % 8 == 0), now_us);
     sample_due_us_ = now_us + kSampleUs;
   }
 }
@@ -100,6 +104,7 @@ void Bench::poll() {
   step_.frame_began = step_.frame != seen_frame_;
   seen_frame_ = step_.frame;
   step_.stalled = !listening_;
+  step_.switch_open = machine.stop_switch_open();
   machine.take_reading(step_.reading);
   static const bool tracing = getenv("SETAE_TRACE") != nullptr;
   if (tracing)

@@ -18,7 +18,8 @@ class Bench final : Machine::Listener {
   Bench();
   Bench(const Bench&) = delete;
 
-  void restart(protocol::ResetCause cause);
+  // `powered_off`: what is retained through a reset is lost.
+  void restart(protocol::ResetCause cause, bool powered_off = false);
   void run_us(uint32_t duration_us);
   // Time passes, but the board is busy elsewhere.
   void stall_us(uint32_t duration_us);
@@ -36,6 +37,8 @@ class Bench final : Machine::Listener {
   Machine machine;
   protocol::Sensor sensor = protocol::Sensor::kOk;
   bool sensor_silent = false;
+  bool sensor_stuck = false;  // a true one never says the same for long
+  int32_t swing_raw = 0;      // from sample to sample
   int32_t pressure_raw = 1013 * protocol::kPressureLsbPerHpa;
 
  private:
@@ -48,6 +51,7 @@ class Bench final : Machine::Listener {
   Step step_ = {};
   uint32_t seen_frame_ = 0;
   uint64_t sample_due_us_ = 0;
+  uint32_t samples_ = 0;
   bool listening_ = true;
   ReferenceDecoder tap_;
   MotionWatch motion_;

@@ -23,6 +23,15 @@ Message read(const Inside& inside) {
 
 }  // namespace
 
+void LineWatch::on_restart(bool powered_off) {
+  LineWatch anew;
+  if (!powered_off)
+    memcpy(anew.records_, records_, sizeof(records_));
+  *this = anew;
+  for (Record& known : records_)
+    known.due_tick = kRepeatFrames;
+}
+
 void LineWatch::on_byte(uint8_t wire) {
   const ReferenceDecoder::Found found = decoder_.push(wire);
   expect(found != ReferenceDecoder::Found::kDamage, "the board sends whole frames");

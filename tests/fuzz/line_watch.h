@@ -19,7 +19,8 @@ extern Reached reached;
 
 class LineWatch {
  public:
-  void on_restart() { *this = LineWatch(); }
+  // A record that was not acknowledged is told after a reset too.
+  void on_restart(bool powered_off);
   // A byte that the board sent.
   void on_byte(uint8_t wire);
   // After the bytes of that step.

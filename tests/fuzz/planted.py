@@ -46,7 +46,7 @@ BUGS: Final = (
         promise="a stop raises the epoch"),
     Bug(name="a_frozen_robot_goes_one_step_on", file=_BOARD,
         right="  next_ = current_;\n  if (hal_.set_pulses", wrong="  if (hal_.set_pulses",
-        promise="nothing moves after a stop, a trip or a fault"),
+        promise="nothing moves"),
     Bug(name="a_late_loop_forgets_a_frame", file=_BOARD,
         right="  now_ = hal_.now();\n  history_.add(current_);", wrong="",
         promise=""),

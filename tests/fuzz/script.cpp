@@ -140,26 +140,38 @@ void Script::act_on_world(uint8_t which, uint8_t variant) {
     case 22:
     case 23:
       return run_frames(kWaits[variant]);
-    case 24:
-      return bench_.run_us(10000u * (1 + (variant & 3)));
     case 25:  // pressure, in steps of 2 hPa
       bench_.pressure_raw = (1013 + 2 * static_cast<int8_t>(input_.byte())) * kHpa;
       return;
     case 26:
       bench_.pressure_raw = 1013 * kHpa;
       bench_.sensor = Sensor::kOk;
-      bench_.sensor_silent = false;
+      bench_.sensor_silent = bench_.sensor_stuck = false;
+      bench_.swing_raw = 0;
+      bench_.machine.set_supply_mv(5000);
       return;
     case 27:
-      if (variant < 6)
+      if (variant < 5)
         bench_.sensor = static_cast<Sensor>(variant);
+      if (variant == 5)
+        bench_.sensor_stuck = true;
       if (variant == 6)
         bench_.sensor_silent = true;
       if (variant == 7)
         bench_.pressure_raw = (input_.byte() & 1) != 0 ? 259 * kHpa : 1261 * kHpa;
       return;
     case 28:
-      bench_.restart(static_cast<protocol::ResetCause>(variant % protocol::kResetCauseCount));
+      return bench_.restart(static_cast<protocol::ResetCause>(variant % protocol::kResetCauseCount),
+                            variant > 5);
+    case 24:  // supply, stop switch, noise
+      if (variant < 2)
+        bench_.machine.set_supply_mv(variant == 0 ? 3500 : 5000);
+      if (variant == 2 || variant == 3)
+        bench_.machine.set_stop_switch(variant == 3);
+      if (variant == 4)
+        bench_.swing_raw = 8 * kHpa;
+      if (variant > 4)
+        bench_.run_us(10000u * (variant - 4u));
       return;
     case 29:
       return bench_.listen(!bench_.listening());
@@ -248,7 +260,8 @@ void Script::set_limits(uint8_t variant) {
     case 0:
       break;
     case 1:
-      message.hold_timeout_s = 1;
+      message.hold_timeout_s = (how & 1) != 0;
+      message.stop_switch = how >> 1 & 1;
       break;
     case 2:
       message.slew_ticks = how;

@@ -97,7 +97,7 @@ void StateWatch::check_modes(const Step& step) {
   const Mode before = step.before.mode;
   const Mode after = step.after.mode;
   if (after == Mode::kStopped && before != Mode::kStopped)
-    expect(step.is(MessageType::kStop) || step.before.limits.stop_switch,
+    expect(step.is(MessageType::kStop) || (step.switch_open && step.before.limits.stop_switch),
            "only a stop, or the switch, leads to stopped");
   if (is_tripped(after) || after == Mode::kStopped || after == Mode::kFault) {
     expect(step.after.guard == protocol::Guard::kOff, "a robot that is frozen is not guarded");
@@ -138,7 +138,7 @@ void StateWatch::check_modes(const Step& step) {
 
 // What is no command in its turn changes nothing.
 void StateWatch::check_untouched(const Step& step) {
-  if (!step.quiet() || step.before.limits.stop_switch)
+  if (!step.quiet() || (step.switch_open && step.before.limits.stop_switch))
     return;
   const bool stop_or_hello = step.is(MessageType::kStop) || step.is(MessageType::kHello);
   const bool stale = (step.is_next(MessageType::kSegments) &&

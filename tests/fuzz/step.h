@@ -58,7 +58,8 @@ struct Step {
   bool delivered;    // a whole frame of a known type, in `host`
   Inside host;
   SensorReading reading;
-  bool stalled;  // nobody reads what the board sends
+  bool stalled;      // nobody reads what the board sends
+  bool switch_open;  // the stop switch, if there is one
 
   protocol::MessageType type() const { return static_cast<protocol::MessageType>(host.bytes[0]); }
   uint8_t session() const { return host.bytes[1]; }
