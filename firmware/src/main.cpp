@@ -2,6 +2,7 @@
 //
 //   D9, D10, D11, D3   servos of tendons 0 to 3
 //   A4 (SDA), A5 (SCL) pressure sensor, through a level shifter
+//   D4                 stop switch to ground, normally closed (optional)
 //   D0, D1 (USB)       the host
 #include <Arduino.h>
 

@@ -13,7 +13,14 @@ from setae.errors import (
     StoppedError,
     TrippedError,
 )
-from setae.link.events import Event, FaultReported, TelemetryReceived, Ticket, Tripped
+from setae.link.events import (
+    Event,
+    FaultReported,
+    StatusReceived,
+    TelemetryReceived,
+    Ticket,
+    Tripped,
+)
 from setae.link.session import Session, refused_error
 from setae.servo import Ticks, segment_messages
 from setae_protocol.messages import (
@@ -22,6 +29,7 @@ from setae_protocol.messages import (
     HostMessage,
     Segment,
     State,
+    Status,
     Telemetry,
     TripCause,
 )
@@ -47,12 +55,15 @@ class Board:
         Record of this session that nobody has resumed from; None without.
     pressure_hpa
         Latest sample of the bristle's sensor; None before the first.
+    status
+        Latest of supply, EEPROM, stop switch and counters; None before the first.
     """
 
     def __init__(self, session: Session) -> None:
         self.trip: Tripped | None = None
         self.fault: FaultReported | None = None
         self.pressure_hpa: float | None = None
+        self.status: Status | None = None
         # Of any session: why the board is tripped or in fault, where it is.
         self._last_trip: Tripped | None = None
         self._last_fault: FaultReported | None = None
@@ -222,6 +233,8 @@ class Board:
             if telemetry.sample_count:
                 sample = telemetry.samples[telemetry.sample_count - 1]
                 self.pressure_hpa = sample.pressure_raw / PRESSURE_LSB_PER_HPA
+        elif isinstance(event, StatusReceived):
+            self.status = event.status
         elif isinstance(event, Tripped):
             self._last_trip = event
             if not event.earlier:
@@ -238,6 +251,23 @@ class Board:
         return (
             last is not None and last.state is State.TRIPPED and not last.telemetry.reflex_running
         )
+
+    def next_status(self) -> Status:
+        """Wait for a status that was made after now."""
+        before = self.status
+        self.wait(lambda: self.status is not before, REPLY_S, "the board's status", watch=False)
+        assert self.status is not None
+        return self.status
+
+    def stored(self) -> None:
+        """Wait until nothing is being written to EEPROM."""
+        before = self.status
+
+        def done() -> bool:
+            now = self.status
+            return now is not None and now is not before and not now.storing
+
+        self.wait(done, REPLY_S, "the board to store its limits")
 
     def next_report(self) -> None:
         """Wait for a report that was made after now."""
@@ -266,7 +296,10 @@ def name_of(code: IntEnum) -> str:
 
 def _fault(report: FaultReported) -> FaultError:
     fault = report.record.fault
-    return FaultError(name_of(fault), fault.remedy, detail=fault.doc)
+    detail = fault.doc
+    if report.record.further:
+        detail += f" {report.record.further} more came before this one was read."
+    return FaultError(name_of(fault), fault.remedy, detail=detail)
 
 
 def _trip_error(trip: Tripped) -> TrippedError:

@@ -17,6 +17,7 @@ from setae.errors import ConfigError, PoseUnknownError, UnreachableError
 from setae.link.session import Session
 from setae.planning import Planner
 from setae.servo import Ticks
+from setae_protocol.crc import crc32c
 from setae_protocol.messages import (
     SERVO_FRAME_US,
     Enable,
@@ -27,6 +28,8 @@ from setae_protocol.messages import (
     Resume,
     SetLimits,
     State,
+    Status,
+    StoreLimits,
     Telemetry,
 )
 
@@ -159,6 +162,39 @@ class Controls:
     def pressure_hpa(self) -> float | None:
         """The latest sample of the bristle's sensor; None before the first."""
         return self._board.pressure_hpa
+
+    @property
+    def limits_stored(self) -> bool | None:
+        """Whether the board's EEPROM holds this configuration's limits; None where it holds none.
+
+        They are in force from the board's start until a host sets its own.
+        """
+        stored_crc = self.status.stored_crc
+        return None if stored_crc == 0 else stored_crc == crc32c(self._planner.limits.pack())
+
+    @property
+    def status(self) -> Status:
+        """The board's supply, EEPROM, stop switch and counters, as told now."""
+        return self._board.next_status()
+
+    def store_limits(self) -> None:
+        """Write this configuration's limits to the board's EEPROM, for its next starts.
+
+        Raises
+        ------
+        RefusedError
+            The board isn't relaxed, or its supply is low.
+        ConfigError
+            The EEPROM does not hold what was written.
+        """
+        self._told("store_limits")
+        self._board.request(StoreLimits(reserved=0))
+        self._board.stored()
+        if not self.limits_stored:
+            raise ConfigError(
+                "The board's EEPROM does not hold the limits that were written.",
+                "Store them again; if it comes back, use another board.",
+            )
 
     # ------------------------------------------------------------ on, off, stop
 

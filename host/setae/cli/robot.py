@@ -18,7 +18,7 @@ from setae import rig
 from setae.cli.common import Where, app, console, interrupts
 from setae.errors import SetaeError
 from setae.robot import Robot
-from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, ResetCause, Sensor
+from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, Fault, ResetCause, Sensor
 
 Flag = Annotated[bool, Parameter(negative="")]
 # Negative coordinates are numbers, not options.
@@ -58,6 +58,8 @@ def info(*, where: Where | None = None) -> None:
             "pose": "known" if robot.pose_known else "unknown: the first enable may jump",
             "sensor": _sensor(robot).doc,
             "limits": f"as configured (crc {reply.limits_crc:08x} at connect)",
+            "stored": _stored(robot),
+            "supply": _supply(robot),
         }
     for name, value in rows.items():
         console.print(f"{name:<11} {value}", markup=False, soft_wrap=True)
@@ -182,6 +184,23 @@ def relax(*, accept_jump: Flag = False, where: Where | None = None) -> None:
 
 
 @app.command
+def store(*, where: Where | None = None) -> None:
+    """Store the configuration's limits in the board, so that it starts with them.
+
+    Ranges, speed, pairs, coarse threshold, hold timeout and stop switch then hold before
+    any host has set its own. The robot must be relaxed.
+
+    Parameters
+    ----------
+    where
+        Which robot.
+    """
+    with _connect(where, leave="hold") as robot:
+        robot.store_limits()
+        console.print("Stored: the board starts with these limits from now on.")
+
+
+@app.command
 def doctor(*, where: Where | None = None) -> int:
     """Check what can be checked, and say what to do about the rest.
 
@@ -235,6 +254,7 @@ def _check_board(where: Where, checks: _Checks) -> str:
     with _connect(where, leave="hold") as robot:
         _check_reset(robot, checks)
         _check_pressure(robot, checks)
+        _check_status(robot, checks)
         port = robot.session.transport.name
         return f"firmware {robot.firmware_version} on {port}, limits as configured"
 
@@ -266,10 +286,8 @@ def _check_pressure(robot: Robot, checks: _Checks) -> None:
     robot.wait(done, timeout_s=_PRESSURE_S + 1, what="pressure samples")
     sensor = robot.telemetry.sensor
     if sensor is not Sensor.OK or not samples:
-        checks.bad(
-            "sensor",
-            f"{sensor.doc} Check its four wires, its 3.3 V supply and its address (0x5D or 0x5C).",
-        )
+        # A sensor's state has the number of its fault.
+        checks.bad("sensor", f"{sensor.doc} {Fault(sensor).remedy}")
         return
     spread_hpa = float(np.ptp(samples))
     text = f"{np.mean(samples):.1f} hPa, {spread_hpa:.2f} hPa peak to peak at rest"
@@ -277,6 +295,43 @@ def _check_pressure(robot: Robot, checks: _Checks) -> None:
         checks.bad("sensor", f"{text}: too noisy. Keep the bristle still; check its silicone bond.")
     else:
         checks.good("sensor", text)
+
+
+def _stored(robot: Robot) -> str:
+    stored = robot.limits_stored
+    if stored is None:
+        return "no limits: the board starts with its built-in ones; `setae store` stores these"
+    return "as configured" if stored else "other limits; `setae store` replaces them"
+
+
+def _supply(robot: Robot) -> str:
+    return f"{robot.status.supply_mv / 1000:.2f} V"
+
+
+# The board's own fault is at 3.8 V; USB gives 4.75 or more.
+_SUPPLY_MIN_MV = 4300
+
+
+def _check_status(robot: Robot, checks: _Checks) -> None:
+    status = robot.status
+    supply = f"{status.supply_mv / 1000:.2f} V"
+    if status.supply_mv < _SUPPLY_MIN_MV:
+        checks.bad("supply", f"{supply}. {Fault.SUPPLY_LOW.remedy}")
+    else:
+        checks.good("supply", supply)
+    counts = (
+        f"{status.rx_framing_errors} framing errors, {status.rx_overruns} overruns,"
+        f" {status.rx_overflows} without room, {status.late_pulses} late pulse edges"
+    )
+    if status.rx_framing_errors or status.rx_overruns or status.rx_overflows:
+        checks.bad("board's line", f"{counts}. Use a short USB cable, away from the servo leads.")
+    elif status.late_pulses:
+        checks.bad("board's line", f"{counts}. Please report it, with what the robot did.")
+    else:
+        checks.good("board's line", counts)
+    if robot.config.motion.stop_switch and status.stop_switch_open:
+        checks.bad("stop switch", "Open. Close it, or set motion.stop_switch = 0.")
+    checks.good("stored limits", _stored(robot))
 
 
 # A board that has just started needs this long for its sensor.

@@ -57,10 +57,14 @@ class Rig {
   void poll() {
     board->poll();
     uint8_t byte;
-    while (hal.pop_tx(byte)) {
-      if (decoder_.push(byte))
-        hear();
-    }
+    while (hal.pop_tx(byte))
+      take(byte);
+  }
+
+  // A byte from the board.
+  void take(uint8_t byte) {
+    if (decoder_.push(byte))
+      hear();
   }
 
   void restart(protocol::ResetCause cause) {

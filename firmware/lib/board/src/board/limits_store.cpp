@@ -14,8 +14,6 @@ static_assert(SetLimits::kSize == 41, "a new layout");
 
 }  // namespace
 
-constexpr uint16_t LimitsStore::kSlotAt[2];
-
 bool LimitsStore::load(SetLimits& limits) {
   crc_ = 0;
   for (uint8_t slot = 0; slot < 2; ++slot) {
@@ -26,8 +24,8 @@ bool LimitsStore::load(SetLimits& limits) {
       continue;
     slot_ = slot;
     generation_ = bytes[0];
-    crc_ = protocol::crc32c(bytes + kHeaderBytes, SetLimits::kSize);
-    decode(bytes + kHeaderBytes, limits);
+    crc_ = protocol::crc32c(bytes + kSlotHeaderBytes, SetLimits::kSize);
+    decode(bytes + kSlotHeaderBytes, limits);
   }
   return crc_ != 0;
 }
@@ -60,7 +58,7 @@ bool LimitsStore::step(const SetLimits& limits) {
       crc.add(byte);
     ++i;
     byte = i == 1              ? kLayout
-           : i < kContentBytes ? wire.bytes()[i - kHeaderBytes]
+           : i < kContentBytes ? wire.bytes()[i - kSlotHeaderBytes]
                                : static_cast<uint8_t>(crc.value() >> 8 * (i - kContentBytes));
   }
   hal_.eeprom_write(kSlotAt[slot_ ^ 1] + position_, byte);

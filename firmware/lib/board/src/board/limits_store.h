@@ -14,15 +14,14 @@ constexpr uint16_t kSupplyLowMv = 3800;
 constexpr uint16_t kSupplyLowPart = supply_mv(kSupplyLowMv);
 constexpr uint16_t kSupplyGoodPart = supply_mv(4000);
 
+// Where the slots begin, and how much of each is used. Address 0 stays free: it is the one that a
+// failing supply is known to corrupt.
+constexpr uint16_t kSlotAt[2] = {32, 96};
+constexpr uint8_t kSlotHeaderBytes = 2;  // generation, layout
+constexpr uint8_t kSlotBytes = kSlotHeaderBytes + protocol::SetLimits::kSize + protocol::kCrcBytes;
+
 class LimitsStore {
  public:
-  // Where the slots begin, and how much of each is used. Address 0 stays free: it is the one that
-  // a failing supply is known to corrupt.
-  static constexpr uint16_t kSlotAt[2] = {32, 96};
-  static constexpr uint8_t kHeaderBytes = 2;  // generation, layout
-  static constexpr uint8_t kSlotBytes =
-      kHeaderBytes + protocol::SetLimits::kSize + protocol::kCrcBytes;
-
   explicit LimitsStore(Hal& hal) : hal_(hal) {}
 
   // False, and `limits` as they were, where none are stored.

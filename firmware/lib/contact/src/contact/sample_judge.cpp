@@ -9,7 +9,8 @@ namespace {
 // LPS33HW, datasheet table 3: operating pressure range.
 constexpr int32_t kPressureMinRaw = 260L * protocol::kPressureLsbPerHpa;
 constexpr int32_t kPressureMaxRaw = 1260L * protocol::kPressureLsbPerHpa;
-// From sample to sample. A contact jumps once, and a bristle that swings turns round seldom.
+// From sample to sample. A contact jumps once, and a bristle that swings takes some samples to
+// turn round.
 constexpr int32_t kJumpRaw = 5L * protocol::kPressureLsbPerHpa;
 constexpr uint8_t kTurn = 4;
 constexpr uint8_t kNoisyTurns = 6 * kTurn;
@@ -25,10 +26,9 @@ Sensor SampleJudge::take(int32_t raw) {
     ++same_;
   }
 
-  const bool jumped = step > kJumpRaw || step < -kJumpRaw;
-  const bool turned = jumped && (step > 0) != rising_;
-  if (jumped)
-    rising_ = step > 0;
+  const int8_t jump = step > kJumpRaw ? 1 : step < -kJumpRaw ? -1 : 0;
+  const bool turned = jump != 0 && jump == -jump_;
+  jump_ = jump;
   if (turned) {
     if (turns_ < kNoisyTurns)
       turns_ += kTurn;

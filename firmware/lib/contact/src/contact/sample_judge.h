@@ -15,8 +15,8 @@ class SampleJudge {
  private:
   int32_t last_raw_ = 0;
   uint8_t same_ = 0;   // samples in a row that equal the one before
-  uint8_t turns_ = 0;  // rises with each jump back, falls with each sample without
-  bool rising_ = false;
+  uint8_t turns_ = 0;  // rises with each jump right back, falls with each sample without
+  int8_t jump_ = 0;    // up, none or down, by the last sample
   bool noisy_ = false;
 };
 

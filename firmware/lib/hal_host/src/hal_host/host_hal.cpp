@@ -22,6 +22,7 @@ void HostHal::forget_retained() {
 
 void HostHal::eeprom_write(uint16_t address, uint8_t value) {
   eeprom_[address] = value;
+  eeprom_address_ = address;
   ++eeprom_writes_;
   eeprom_ready_us_ = board_us_ + kEepromWriteUs;
 }

@@ -53,6 +53,7 @@ class HostHal : public Hal {
   // How many bytes were written to EEPROM, and its content.
   uint32_t eeprom_writes() const { return eeprom_writes_; }
   uint8_t& eeprom(uint16_t address) { return eeprom_[address]; }
+  uint16_t last_eeprom_address() const { return eeprom_address_; }
 
   // ---- Hal ----
 
@@ -101,6 +102,7 @@ class HostHal : public Hal {
   bool stop_switch_open_ = true;  // there is none
   uint8_t eeprom_[kEepromBytes];
   uint32_t eeprom_writes_ = 0;
+  uint16_t eeprom_address_ = 0;
   uint64_t eeprom_ready_us_ = 0;
 };
 
