@@ -53,6 +53,7 @@ class Board {
   // ---- board.cpp: time ----
   SETAE_OWN_FRAME void start();
   SETAE_OWN_FRAME void start_limits();
+  bool sample_goes_first();
   SETAE_OWN_FRAME void begin_frame(const BoardTime& now);
   void advance_motion();
   void watch_hold_timeout();

@@ -9,8 +9,8 @@ using protocol::Refusal;
 
 namespace {
 
-// Bounds a poll: what came in 1.3 ms.
-constexpr uint8_t kBytesPerPoll = 64;
+// Less is left until it is more, unless it ends a frame: each turn costs as much as three bytes.
+constexpr uint8_t kBytesAtATime = 12;
 // Segments that come this soon after the queue ran dry were meant to come before.
 constexpr uint8_t kUnderrunFrames = 5;
 
@@ -18,11 +18,12 @@ constexpr uint8_t kUnderrunFrames = 5;
 
 void Board::receive() {
   ReceiveRing& ring = hal_.received();
-  uint8_t left = kBytesPerPoll;
+  if (!ring.ended && ring.size() < kBytesAtATime)
+    return;
+  ring.ended = false;
+  uint8_t left = ring.size();  // and not what comes meanwhile, byte by byte
   while (left != 0) {
     uint8_t count = ring.front_size();
-    if (count == 0)
-      return;
     if (count > left)
       count = left;
     bool message;
@@ -32,6 +33,10 @@ void Board::receive() {
     if (message) {
       handle_message();
       report();
+      if (sample_goes_first()) {
+        ring.ended = true;
+        return;
+      }
     }
   }
 }

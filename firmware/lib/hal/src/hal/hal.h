@@ -56,6 +56,9 @@ class Hal {
   // Never waits longer than 1 ms.
   virtual SensorReading read_sensor() = 0;
 
+  // It is being fetched: soon read_sensor() has it.
+  virtual bool sample_on_its_way() = 0;
+
   virtual protocol::ResetCause reset_cause() = 0;
   virtual Retained& retained() = 0;
 

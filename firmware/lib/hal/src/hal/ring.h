@@ -65,6 +65,8 @@ struct ByteRing {
 
   volatile uint8_t head = 0;  // owned by the writer
   volatile uint8_t tail = 0;  // owned by the reader
+  // The writer of a received ring says that a frame has ended; the reader takes it back.
+  volatile bool ended = false;
   uint8_t bytes[kBytes] = {};
 
  private:

@@ -41,8 +41,10 @@ void HostHal::advance_to(uint64_t board_us) {
 }
 
 bool HostHal::push_rx(uint8_t byte) {
-  if (receive_.push(byte))
+  if (receive_.push(byte)) {
+    receive_.ended = receive_.ended || byte == 0;
     return true;
+  }
   ++errors_.dropped;
   return false;
 }

@@ -65,6 +65,7 @@ class HostHal : public Hal {
   uint32_t set_pulses(const Pulses& pulses, uint8_t attached) override;
   uint8_t late_pulses() override { return late_pulses_; }
   SensorReading read_sensor() override;
+  bool sample_on_its_way() override { return false; }
   protocol::ResetCause reset_cause() override { return reset_cause_; }
   Retained& retained() override { return retained_; }
   uint16_t bandgap_part() override { return bandgap_part_; }

@@ -1,5 +1,11 @@
 #include "hal_uno/lps33hw.h"
 
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <util/atomic.h>
+
+#include "hal_uno/servo_pulses.h"
+
 namespace setae {
 
 using protocol::Sensor;
@@ -13,100 +19,178 @@ constexpr uint8_t kCtrlReg1 = 0x10;
 constexpr uint8_t kRate75Hz = 5 << 4;
 constexpr uint8_t kBlockDataUpdate = 1 << 1;  // the three bytes are of one sample
 constexpr uint8_t kCtrlReg2 = 0x11;
+constexpr uint8_t kSoftwareReset = 1 << 2;
 constexpr uint8_t kAutoIncrement = 1 << 4;
-constexpr uint8_t kStatusRegister = 0x27;
+constexpr uint8_t kCtrlReg3 = 0x12;
+constexpr uint8_t kDataReadyOut = 1 << 2;  // INT_DRDY is high from a sample until it is read
+constexpr uint8_t kStatusRegister = 0x27;  // PRESS_OUT follows, the high byte last
 constexpr uint8_t kPressureReady = 1 << 0;
-constexpr uint8_t kPressOutXl = 0x28;  // the high byte last: reading it frees the registers
 
-constexpr uint32_t kRetryUs = 100000;
-constexpr uint32_t kSilentUs = 100000;
-// 75 Hz is 13.3 ms, 12.9 with a fast oscillator. To look earlier only loads the bus; from then
-// on the status is read without a break. Counted from where the last sample was seen, and with
-// room for the transfers: each look must begin a little earlier than the sample before, or they
-// fall behind the sensor, up to a whole period, and nobody notices.
-constexpr uint32_t kEarliestUs = 12000;
+constexpr uint8_t kRetryFrames = 5;
+constexpr uint8_t kSilentFrames = 5;
+
+// Timer0 ticks of 16 us. 75 Hz is 13.3 ms, 12.9 with a fast oscillator.
+constexpr uint16_t kEarliestWait = 12000 / 16;
+constexpr uint16_t kLatestWait = 14000 / 16;
+// With D2 wired the timer only steps in where an edge was missed.
+constexpr uint16_t kWiredWait = 16000 / 16;
+// Each look that comes to nothing takes 0.25 ms. One of them shows that the sample was not late.
+constexpr uint8_t kWaitStep = 4;
+constexpr uint8_t kLooksMax = 12;
+
+constexpr uint8_t kTimerTicks = 32;     // of 0.5 us each
+constexpr uint16_t kStatusTicks = 240;  // a read's start to its look at the status
+
+Lps33hw* served = nullptr;
+uint8_t rounds_left;  // of Timer0, 4.1 ms each
+
+constexpr uint8_t kTimerOn = _BV(OCIE0A);
+
+void start_timer(uint16_t ticks) {
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    rounds_left = static_cast<uint8_t>((ticks - 1) >> 8);
+    OCR0A = static_cast<uint8_t>(TCNT0 + ticks);
+    TIFR0 = _BV(OCF0A);
+    TIMSK0 = kTimerOn;
+  }
+}
+
+void stop_handlers() {
+  TIMSK0 = 0;
+  EIMSK = 0;
+}
+
+bool data_ready_pin() {
+  return (PIND & _BV(PIND2)) != 0;
+}
 
 }  // namespace
 
+void Lps33hw::begin() {
+  served = this;
+  // Weakly up: high for ever where nothing is wired.
+  PORTD |= _BV(PORTD2);
+  EICRA = _BV(ISC01) | _BV(ISC00);  // rising
+  TCCR0A = 0;
+  TCCR0B = _BV(CS02);  // 16 MHz / 256
+  stop_handlers();
+  twi_.begin();
+}
+
+void Lps33hw::fetch(bool by_timer) {
+  stop_handlers();
+  by_timer_ = by_timer;
+  twi_.go();
+}
+
 SensorReading Lps33hw::poll(const BoardTime& now) {
-  const uint32_t now_us = now.frame * protocol::kServoFrameUs + now.phase_us;
   SensorReading reading = {status_, false, 0, now};
   switch (twi_.poll()) {
     case Twi::Result::kBusy:
       break;
     case Twi::Result::kNoAck:
       address_ ^= 1;
-      fail(Sensor::kAbsent, now_us);
+      fail(Sensor::kAbsent, now);
       break;
     case Twi::Result::kFailed:
-      fail(Sensor::kBus, now_us);
+      fail(Sensor::kBus, now);
       break;
     case Twi::Result::kIdle:
-      if (!due(now_us))
-        break;
-      if (step_ == Step::kPause) {
+      if (step_ == Step::kPause && now.frame - since_frame_ >= kRetryFrames) {
         step_ = Step::kIdentify;
         twi_.start_read(address_, kWhoAmI, 1);
-      } else {
-        step_ = Step::kStatus;
-        twi_.start_read(address_, kStatusRegister, 1);
       }
       break;
     case Twi::Result::kDone:
-      ready_ = step_ == Step::kStatus ? now : ready_;
-      on_done(now_us, reading);
+      on_done(now, reading);
       break;
   }
   reading.status = status_;
   return reading;
 }
 
-void Lps33hw::on_done(uint32_t now_us, SensorReading& reading) {
-  const uint8_t* data = twi_.data();
+void Lps33hw::on_done(const BoardTime& now, SensorReading& reading) {
   switch (step_) {
     case Step::kIdentify:
-      if (data[0] != kIdentity)
-        return fail(Sensor::kWrong, now_us);
+      if (twi_.data()[0] != kIdentity)
+        return fail(Sensor::kWrong, now);
+      step_ = Step::kReset;
+      return twi_.start_write(address_, kCtrlReg2, kSoftwareReset | kAutoIncrement);
+    case Step::kReset:
       step_ = Step::kSetAddressing;
       return twi_.start_write(address_, kCtrlReg2, kAutoIncrement);
     case Step::kSetAddressing:
+      step_ = Step::kSetDataReady;
+      return twi_.start_write(address_, kCtrlReg3, kDataReadyOut);
+    case Step::kSetDataReady:
       step_ = Step::kSetRate;
       return twi_.start_write(address_, kCtrlReg1, kRate75Hz | kBlockDataUpdate);
     case Step::kSetRate:
       status_ = Sensor::kOk;
-      sampled_us_ = now_us;
-      step_ = Step::kWait;
-      due_us_ = now_us;
-      return;
-    case Step::kStatus:
-      if (data[0] & kPressureReady) {
-        step_ = Step::kData;
-        due_us_ = now_us + kEarliestUs;
-        return twi_.start_read(address_, kPressOutXl, 3);
-      }
-      if (now_us - sampled_us_ > kSilentUs)
-        return fail(Sensor::kSilent, now_us);
-      step_ = Step::kWait;
-      return;
-    case Step::kData: {
-      const uint32_t raw =
-          static_cast<uint32_t>(data[2]) << 16 | static_cast<uint16_t>(data[1]) << 8 | data[0];
-      reading.fresh = true;
-      reading.pressure_raw = static_cast<int32_t>(raw << 8) / 256;  // sign of 24 bits
-      reading.sampled = ready_;
-      sampled_us_ = now_us;
-      step_ = Step::kWait;
-      return;
-    }
+      step_ = Step::kRun;
+      running_ = true;
+      since_frame_ = now.frame;
+      wait_ = kEarliestWait;
+      return expect_next(0);
+    case Step::kRun:
+      return take_sample(now, reading);
     default:
-      return fail(Sensor::kBus, now_us);
+      return fail(Sensor::kBus, now);
   }
 }
 
-void Lps33hw::fail(Sensor status, uint32_t now_us) {
+void Lps33hw::take_sample(const BoardTime& now, SensorReading& reading) {
+  const uint8_t* data = twi_.data();
+  const uint16_t begun_ticks = twi_.begun_ticks();
+  if (twi_.found()) {
+    const uint32_t raw =
+        static_cast<uint32_t>(data[3]) << 16 | static_cast<uint16_t>(data[2]) << 8 | data[1];
+    reading.fresh = true;
+    reading.pressure_raw = static_cast<int32_t>(raw << 8) / 256;  // sign of 24 bits
+    reading.sampled = servo_pulses::at(static_cast<uint16_t>(begun_ticks + kStatusTicks));
+    since_frame_ = now.frame;
+    if (by_timer_ && twi_.misses() == 0 && wait_ > kEarliestWait)
+      wait_ -= kWaitStep;
+    if (by_timer_ && twi_.misses() > 1 && wait_ < kLatestWait)
+      wait_ += kWaitStep;
+    return expect_next(static_cast<uint16_t>(servo_pulses::ticks() - begun_ticks));
+  }
+  if (now.frame - since_frame_ > kSilentFrames)
+    return fail(Sensor::kSilent, now);
+  expect_next(0xFFFF);  // at once: it is overdue
+}
+
+void Lps33hw::expect_next(uint16_t elapsed_ticks) {
+  twi_.prepare_polling(address_, kStatusRegister, kPressureReady, kLooksMax);
+  // The last one has just been read: a wired line is low until the next is there.
+  const bool wired = !data_ready_pin();
+  if (wired) {
+    EIFR = _BV(INTF0);
+    EIMSK = _BV(INT0);
+  }
+  const uint16_t elapsed = elapsed_ticks / kTimerTicks;
+  const uint16_t wait = wired ? kWiredWait : wait_;
+  start_timer(elapsed < wait ? static_cast<uint16_t>(wait - elapsed) : 1);
+}
+
+void Lps33hw::fail(Sensor status, const BoardTime& now) {
+  stop_handlers();
+  running_ = false;
   status_ = status;
   step_ = Step::kPause;
-  due_us_ = now_us + kRetryUs;
+  since_frame_ = now.frame;
 }
 
 }  // namespace setae
+
+ISR(INT0_vect) {
+  setae::served->fetch(false);
+}
+
+ISR(TIMER0_COMPA_vect) {
+  if (setae::rounds_left == 0) {
+    setae::served->fetch(true);
+  } else {
+    --setae::rounds_left;
+  }
+}

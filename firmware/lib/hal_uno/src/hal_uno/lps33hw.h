@@ -1,4 +1,8 @@
 // The bristle's pressure sensor, ST LPS33HW.
+//
+// A sample is fetched by handlers alone, so that a busy loop can't delay it: where the sensor's
+// data-ready output is wired to D2, that starts the transfer; else Timer0 does, a little before the
+// next sample is due, and the status is read without a break until it is there.
 #pragma once
 
 #include <stdint.h>
@@ -10,33 +14,41 @@ namespace setae {
 
 class Lps33hw {
  public:
-  void begin() { twi_.begin(); }
+  void begin();
 
-  // Advances whatever is under way, without waiting.
+  // Hands out what has come, without waiting.
   SensorReading poll(const BoardTime& now);
+
+  // A sample is about to come, or on its way.
+  bool fetching() const { return running_ && twi_.busy(); }
+
+  // For the handlers: by the timer, or by D2.
+  void fetch(bool by_timer);
 
  private:
   enum class Step : uint8_t {
     kPause,  // until it makes sense to look for the sensor again
     kIdentify,
+    kReset,
     kSetAddressing,
+    kSetDataReady,
     kSetRate,
-    kWait,  // until a sample may be ready
-    kStatus,
-    kData,
+    kRun,
   };
 
-  void on_done(uint32_t now_us, SensorReading& reading);
-  void fail(protocol::Sensor status, uint32_t now_us);
-  bool due(uint32_t now_us) const { return static_cast<int32_t>(now_us - due_us_) >= 0; }
+  void on_done(const BoardTime& now, SensorReading& reading);
+  void take_sample(const BoardTime& now, SensorReading& reading);
+  void expect_next(uint16_t elapsed_ticks);
+  void fail(protocol::Sensor status, const BoardTime& now);
 
   Twi twi_;
   Step step_ = Step::kPause;
   protocol::Sensor status_ = protocol::Sensor::kAbsent;
   uint8_t address_ = 0x5D;  // SA0 high; else 0x5C
-  uint32_t due_us_ = 0;
-  uint32_t sampled_us_ = 0;
-  BoardTime ready_ = {};
+  bool running_ = false;
+  bool by_timer_ = false;
+  uint16_t wait_ = 0;         // from one fetch to the next, Timer0 ticks
+  uint32_t since_frame_ = 0;  // the last sample, or failure
 };
 
 }  // namespace setae

@@ -68,7 +68,6 @@ uint8_t late;
 
 void begin() {
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    TIMSK0 = 0;  // the Arduino core's millis(), which nothing here uses
     TIMSK2 = 0;
     TCCR1B = 0;
     TCCR2B = 0;
@@ -138,6 +137,18 @@ BoardTime now() {
   if (elapsed >= kFrameTicks)
     elapsed = kFrameTicks - 1;
   time.phase_us = elapsed / protocol::kPulseTicksPerUs;
+  return time;
+}
+
+BoardTime at(uint16_t then) {
+  BoardTime time = now();
+  const uint16_t ago_us = static_cast<uint16_t>(ticks() - then) / protocol::kPulseTicksPerUs;
+  if (time.phase_us >= ago_us) {
+    time.phase_us -= ago_us;
+  } else {
+    time.phase_us += protocol::kServoFrameUs - ago_us;
+    --time.frame;
+  }
   return time;
 }
 

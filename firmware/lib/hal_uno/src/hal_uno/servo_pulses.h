@@ -22,6 +22,8 @@ BoardTime now();
 // Edges that could not be armed in time, since start, modulo 256: none, unless interrupts are off
 // for longer than they ever should be.
 uint8_t late_armings();
+// What now() said when ticks() said that, less than 30 ms ago.
+BoardTime at(uint16_t ticks);
 // 0.5 us each; wraps after 32 ms.
 uint16_t ticks();
 

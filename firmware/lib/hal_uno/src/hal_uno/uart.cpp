@@ -116,7 +116,9 @@ ISR(USART_RX_vect, ISR_NAKED) {
       "inc r30 \n\t"
       "sts %[lost]+2, r30 \n\t"
       "rjmp 9b \n"
-      "5: lds r24, %[tcntl] \n\t"
+      "5: ldi r24, 1 \n\t"
+      "sts %[ended], r24 \n\t"
+      "lds r24, %[tcntl] \n\t"
       "sts %[ticks], r24 \n\t"
       "lds r24, %[tcnth] \n\t"
       "sts %[ticks]+1, r24 \n\t"
@@ -127,8 +129,8 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [errors] "n"(_BV(FE0) | _BV(DOR0)), [overrun] "I"(DOR0), [frame] "I"(FE0),
         [head] "i"(&ring_in.head), [tail] "i"(&ring_in.tail), [bytes] "i"(&ring_in.bytes),
         [full] "n"(256 - setae::kReceiveRingBytes), [mask] "n"(setae::kReceiveRingBytes - 1),
-        [lost] "i"(&lost), [ticks] "i"(&frame_end_ticks), [tcntl] "n"(_SFR_MEM_ADDR(TCNT1L)),
-        [tcnth] "n"(_SFR_MEM_ADDR(TCNT1H)));
+        [ended] "i"(&ring_in.ended), [lost] "i"(&lost), [ticks] "i"(&frame_end_ticks),
+        [tcntl] "n"(_SFR_MEM_ADDR(TCNT1L)), [tcnth] "n"(_SFR_MEM_ADDR(TCNT1H)));
 }
 
 ISR(USART_UDRE_vect, ISR_NAKED) {

@@ -33,6 +33,7 @@ void UnoHal::begin() {
   supply::begin();
   stop_switch::begin();
   uart::begin();
+  TIMSK0 = 0;  // the Arduino core's millis(), which nothing here uses
   servo_pulses::begin();
   sensor_.begin();
   start_watchdog();
@@ -72,6 +73,10 @@ uint32_t UnoHal::set_pulses(const Pulses& pulses, uint8_t attached) {
 
 SensorReading UnoHal::read_sensor() {
   return sensor_.poll(servo_pulses::now());
+}
+
+bool UnoHal::sample_on_its_way() {
+  return sensor_.fetching();
 }
 
 protocol::ResetCause UnoHal::reset_cause() {

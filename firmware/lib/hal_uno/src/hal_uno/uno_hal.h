@@ -21,6 +21,7 @@ class UnoHal final : public Hal {
   LineErrors line_errors() override;
   uint32_t set_pulses(const Pulses& pulses, uint8_t attached) override;
   SensorReading read_sensor() override;
+  bool sample_on_its_way() override;
   protocol::ResetCause reset_cause() override;
   Retained& retained() override;
   uint8_t late_pulses() override;

@@ -24,16 +24,14 @@ class LineSink {
 
 }  // namespace
 
-bool Transmitter::send_bytes(protocol::BoardHeader& header, const uint8_t* payload, uint8_t size) {
+bool Transmitter::send_bytes(protocol::BoardHeader header, protocol::MessageType type,
+                             const uint8_t* payload, uint8_t size) {
   if (!ready())
     return false;
+  header.type = static_cast<uint8_t>(type);
   header.sequence = sequence_++;
-  LineSink line(hal_);
-  protocol::FrameEncoder<LineSink> frame(line);
-  protocol::Wire<protocol::BoardHeader> wire(header);
-  frame.add(wire.bytes(), protocol::BoardHeader::kSize);
-  frame.add(payload, size);
-  frame.finish();
+  const protocol::Wire<protocol::BoardHeader> wire(header);
+  protocol::encode_frame(LineSink(hal_), wire.bytes(), protocol::BoardHeader::kSize, payload, size);
   return true;
 }
 

@@ -23,14 +23,14 @@ class Transmitter {
 
   // Fills in the header's type and sequence. False where too much waits before it.
   template <typename Message>
-  bool send(protocol::BoardHeader header, const Message& message) {
-    header.type = static_cast<uint8_t>(Message::kType);
+  bool send(const protocol::BoardHeader& header, const Message& message) {
     protocol::Wire<Message> wire(message);
-    return send_bytes(header, wire.bytes(), Message::kSize);
+    return send_bytes(header, Message::kType, wire.bytes(), Message::kSize);
   }
 
  private:
-  bool send_bytes(protocol::BoardHeader& header, const uint8_t* payload, uint8_t size);
+  bool send_bytes(protocol::BoardHeader header, protocol::MessageType type, const uint8_t* payload,
+                  uint8_t size);
 
   Hal& hal_;
   uint8_t sequence_ = 0;

@@ -83,6 +83,10 @@ class CobsDecoder {
     return Step::kByte;
   }
 
+  // So many bytes now come as they are. For who takes some of them without push():
+  uint8_t left() const { return left_; }
+  void skip(uint8_t count) { left_ = static_cast<uint8_t>(left_ - count); }
+
   // Whether the frame may end here: its last run is complete.
   bool complete() const { return left_ == 0; }
   // No byte since the start.

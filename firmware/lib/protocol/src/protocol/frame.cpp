@@ -4,11 +4,16 @@ namespace setae {
 namespace protocol {
 
 uint8_t encode_frame(const uint8_t* frame, uint8_t size, uint8_t* wire) {
-  MemorySink sink(wire);
-  FrameEncoder<MemorySink> encoder(sink);
-  encoder.add(frame, size);
-  return encoder.finish();
+  return encode_frame(MemorySink(wire), frame, size, nullptr, 0);
 }
+
+namespace {
+
+uint8_t smallest(uint8_t a, uint8_t b) {
+  return a < b ? a : b;
+}
+
+}  // namespace
 
 uint8_t FrameDecoder::take(const uint8_t* wire, uint8_t count, bool& good) {
   good = false;
@@ -22,10 +27,29 @@ uint8_t FrameDecoder::take(const uint8_t* wire, uint8_t count, bool& good) {
   CobsDecoder cobs = cobs_;  // copies that can stay in registers
   Crc32c crc = crc_;
   uint8_t* out = bytes_ + size_;
-  uint8_t taken = 0;
-  while (taken != count) {
+  uint8_t room = static_cast<uint8_t>(kFrameBytesMax - size_);
+  uint8_t left = count;
+  while (left != 0) {
+    // Most bytes are in the middle of a run: for so many there is nothing but a zero to look for.
+    const uint8_t most = smallest(left, smallest(room, cobs.left()));
+    uint8_t run = most;
+    for (; run != 0; --run) {
+      const uint8_t byte = *wire;
+      if (byte == 0)
+        break;
+      ++wire;
+      *out++ = byte;
+      crc.add(byte);
+    }
+    const uint8_t moved = static_cast<uint8_t>(most - run);
+    cobs.skip(moved);
+    room = static_cast<uint8_t>(room - moved);
+    left = static_cast<uint8_t>(left - moved);
+    if (left == 0)
+      break;
+
     const uint8_t coded = *wire++;
-    ++taken;
+    --left;
     if (coded == 0) {
       ended_ = true;
       break;
@@ -33,19 +57,20 @@ uint8_t FrameDecoder::take(const uint8_t* wire, uint8_t count, bool& good) {
     uint8_t byte;
     if (cobs.push(coded, byte) == CobsDecoder::Step::kNothing)
       continue;
-    if (out == bytes_ + kFrameBytesMax) {
+    if (room == 0) {
       too_long_ = true;
       continue;
     }
+    --room;
     *out++ = byte;
     crc.add(byte);
   }
   cobs_ = cobs;
   crc_ = crc;
-  size_ = static_cast<uint8_t>(out - bytes_);
+  size_ = static_cast<uint8_t>(kFrameBytesMax - room);
   if (ended_)
     good = finish();
-  return taken;
+  return static_cast<uint8_t>(count - left);
 }
 
 bool FrameDecoder::finish() {

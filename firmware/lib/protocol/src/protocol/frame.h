@@ -16,43 +16,35 @@ static_assert(kFrameBytesMax <= 253, "cobs_encode knows short frames only");
 static_assert(BoardHeader::kSize + kBoardPayloadMax + kCrcBytes <= kFrameBytesMax, "");
 static_assert(HostHeader::kSize + kHostPayloadMax + kCrcBytes <= kFrameBytesMax, "");
 
-// Makes a frame in one pass: what is published may be on the line while the rest is still to come.
+// Makes a frame of two parts in one pass, CRC and delimiter included: what is published may be on
+// the line while the rest is still to come. Returns the bytes on the wire.
 template <typename Sink>
-class FrameEncoder {
- public:
-  explicit FrameEncoder(const Sink& sink) : sink_(sink) {}
-
-  void add(const uint8_t* data, uint8_t size) {
-    Sink sink = sink_;  // copies that can stay in registers
-    CobsEncoder cobs = cobs_;
-    Crc32c crc = crc_;
+uint8_t encode_frame(Sink sink, const uint8_t* part, uint8_t size, const uint8_t* next_part,
+                     uint8_t next_size) {
+  CobsEncoder cobs;
+  Crc32c crc;
+  for (;;) {
     for (; size != 0; --size) {
-      const uint8_t byte = *data++;
+      const uint8_t byte = *part++;
       crc.add(byte);
       cobs.push(byte, sink);
     }
-    cobs_ = cobs;
-    crc_ = crc;
+    if (next_size == 0)
+      break;
+    part = next_part;
+    size = next_size;
+    next_size = 0;
   }
-
-  // CRC and delimiter. Returns the bytes on the wire.
-  uint8_t finish() {
-    uint32_t crc = crc_.value();
-    for (uint8_t i = 0; i < kCrcBytes; ++i) {
-      cobs_.push(static_cast<uint8_t>(crc), sink_);
-      crc >>= 8;
-    }
-    const uint8_t size = cobs_.finish(sink_);
-    sink_.stage(size, 0);
-    sink_.publish(size + 1);
-    return size + 1;
+  uint32_t value = crc.value();
+  for (uint8_t i = 0; i < kCrcBytes; ++i) {
+    cobs.push(static_cast<uint8_t>(value), sink);
+    value >>= 8;
   }
-
- private:
-  Sink sink_;
-  CobsEncoder cobs_;
-  Crc32c crc_;
-};
+  const uint8_t stuffed = cobs.finish(sink);
+  sink.stage(stuffed, 0);
+  sink.publish(stuffed + 1);
+  return stuffed + 1;
+}
 
 // The `size` bytes of header and payload in `frame` as they go over the wire, delimiter included.
 // Returns how many.
