@@ -7,12 +7,20 @@
 
 namespace setae {
 
+namespace {
+
+// What comes while a frame begins and a report is made finds room beside so many.
+constexpr uint8_t kReceivedFirstBytes = 48;
+
+}  // namespace
+
 // Nothing overtakes what finds no room: small answers to a host that asks without a break would
 // keep the line from ever having room for a record.
 // What the board sends by itself goes first, for the same reason: records and telemetry come at
 // their own pace, answers as fast as they are asked for.
 void Board::report() {
-  if (!transmitter_.ready())
+  // Answers can wait; bytes that find no room are lost.
+  if (hal_.received().size() > kReceivedFirstBytes || !transmitter_.ready())
     return;
   if (!send_latched(trip_) || !send_latched(fault_) || !send_latched(refusal_))
     return;
