@@ -106,8 +106,9 @@ BUGS: Final = (
         right="  if (message.count > player_.room())\n    return Verdict::wait();", wrong="",
         promise="room"),
     Bug(name="limits_change_at_any_time", file=_COMMANDS,
-        right="  const Verdict verdict = ask(Event::kSetLimits);",
-        wrong="  const Verdict verdict = Verdict::accept();",
+        right="  Verdict verdict = ask(Event::kSetLimits);\n  if (verdict.ok())\n"
+              "    verdict = limits_.set(message);",
+        wrong="  Verdict verdict = limits_.set(message);",
         promise="limits change only while relaxed"),
     Bug(name="a_long_frame_is_written_behind_the_buffer", file=_FRAME, target="decoder",
         right="if (out == bytes_ + kFrameBytesMax)", wrong="if (out == bytes_ + 250)", promise=""),
@@ -139,6 +140,17 @@ def plant(bug: Bug) -> str:
         [folder / "target", *_corpus(bug.target)], capture_output=True, text=True, check=False
     )
     return done.stderr if done.returncode != 0 else ""
+
+
+def reached() -> str:
+    """Return what the board's corpus reaches: lines of a name and numbers."""
+    own = [*building.sources_of("board"), HERE / "replay.cpp"]
+    program = building.build(building.QUICK, "board", own, tag="quick")
+    done = subprocess.run(
+        [program, *_corpus("board")],
+        capture_output=True, text=True, check=True, env={"SETAE_REACHED": "1"},
+    )  # fmt: skip
+    return done.stdout
 
 
 def _corpus(target: str) -> list[Path]:

@@ -129,6 +129,8 @@ void Script::act_on_motion(uint8_t which, uint8_t variant) {
     case 19:
       return guard(variant);
     case 20:
+      if (variant > 5)
+        return send(protocol::StoreLimits{0});
       return send(protocol::Disarm{0});
     default:
       return set_limits(variant);

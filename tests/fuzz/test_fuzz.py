@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from tests.fuzz import building, fuzz, planted
 
+from setae_protocol.messages import Fault, Refusal, TripCause
+
 RUNS = {"decoder": 20_000, "board": 2_000}
 
 
@@ -14,6 +16,16 @@ def test_nothing_that_a_host_sends_breaks_a_promise(target: str) -> None:
     done = fuzz.check(target, RUNS[target])
     assert done.returncode == 0, done.stderr[-4000:]
     assert f"stat::number_of_executed_units: {RUNS[target]}" in done.stderr
+
+
+def test_the_corpus_meets_every_mode_fault_refusal_and_trip() -> None:
+    lines = (line.split() for line in planted.reached().splitlines())
+    met = {name: {int(number) for number in numbers} for name, *numbers in lines}
+    assert met["mode"] == set(range(9))
+    assert met["fault"] == set(Fault) - {Fault.NONE, Fault.INTERNAL}
+    # A low supply is a fault, and that refuses first.
+    assert met["refusal"] == set(Refusal) - {Refusal.NONE, Refusal.SUPPLY_LOW}
+    assert met["trip"] == set(TripCause)
 
 
 @pytest.mark.parametrize("bug", planted.BUGS, ids=lambda bug: bug.name)
