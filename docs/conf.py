@@ -41,12 +41,12 @@ numpydoc_class_members_toctree = False
 
 
 def link_within_pages(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Let the pages of protocol/ find each other here, where they are only linked to."""
+    """Let the pages of protocol/ find each other, and pictures, here where they are links."""
     del app
     if docname.startswith("protocol/"):
         source[0] = re.sub(
-            r"\[([^]]+)\]\((README|REFERENCE)\.md\)", r"{doc}`\1 </protocol/\2>`", source[0]
-        )
+            r"\[([^]]+)\]\((README|REFERENCE|STATES)\.md\)", r"{doc}`\1 </protocol/\2>`", source[0]
+        ).replace("(../docs/pictures/", "(../pictures/")
 
 
 def setup(app: Sphinx) -> None:

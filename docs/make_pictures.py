@@ -3,7 +3,7 @@
     python docs/make_pictures.py [RUN_DIR]
 
 Without a folder it runs the paper's five trials in the simulator, seed 0. With
-one it draws the logs in it. The theory's pictures it draws in any case.
+one it draws the logs in it. The theory's and the protocol's pictures it draws in any case.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import motion_pictures
+import protocol_pictures
 import theory_pictures
 
 from setae.report import explore, pictures
@@ -32,6 +33,7 @@ def main(arguments: list[str]) -> None:
     """Draw the given run, or one made for it."""
     theory_pictures.draw(PICTURES)
     motion_pictures.draw(PICTURES)
+    protocol_pictures.draw(PICTURES)
     if arguments:
         draw(Path(arguments[0]))
         return

@@ -150,16 +150,20 @@ def states_page() -> str:
         "",
         legend,
         "",
-        "| Event | " + " | ".join(modes) + " |",
-        "|---|" + "---|" * len(modes),
     ]
-    lines += [
-        f"| `{event}` | "
-        + " | ".join(_word(byte, mode, modes) for mode, byte in zip(modes, row, strict=True))
-        + " |"
-        for event, row in table.cells.items()
-    ]
-    lines += ["", "What the events mean, where the name does not say it:", ""]
+    latched = modes.index("stopped")  # two tables, that fit a page
+    for title, part in (("Free", modes[:latched]), ("Latched", modes[latched:])):
+        lines += [
+            f"### {title}",
+            "",
+            f"| Event | {' | '.join(part)} |",
+            "|---|" + "---|" * len(part),
+        ]
+        for event, row in table.cells.items():
+            words = (_word(row[modes.index(mode)], mode, modes) for mode in part)
+            lines.append(f"| `{event}` | {' | '.join(words)} |")
+        lines.append("")
+    lines += ["What the events mean, where the name does not say it:", ""]
     lines += [f"- `{event}`: {doc}" for event, doc in table.events.items() if doc]
     return "\n".join(lines) + "\n"
 
