@@ -162,3 +162,19 @@ def test_a_stop_at_a_frames_very_start_does_not_pull_back(driver: Driver) -> Non
         widths = [pulse.width for pulse in pulses]
         assert widths == sorted(widths)
     _assert_every_pulse_is_as_told(driver)
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [HIGH, LOW, (5000, 1000, 5000, 1000), (1000, 5000, 1000, 5000), (3001, 3000, 2999, 3000)],
+)
+def test_all_four_pulses_end_within_5_2_ms_whatever_their_widths(
+    driver: Driver, pose: Ticks
+) -> None:
+    driver.enable(pose)
+    driver.session.run_for(100_000)
+    whole = [frame for frame in driver.frames() if None not in frame.ticks]
+    assert whole
+    for frame in whole:
+        assert frame.last_fall - frame.first_rise <= 5_200 * CYCLES_PER_US
+    _assert_every_pulse_is_as_told(driver)
