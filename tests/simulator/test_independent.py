@@ -32,34 +32,44 @@ def test_agrees_with_a_shooting_solver(make_driver: MakeDriver, uneven: bool) ->
         assert truth.tension_n == pytest.approx(tensions, abs=0.05)
 
 
-@pytest.mark.parametrize("short_mm", [40.0, 46.0, 52.0])
+@pytest.mark.parametrize(
+    "lengths_mm",
+    [
+        (40.0, 60.0, 75.0, 60.0),
+        (46.0, 60.0, 75.0, 60.0),
+        (52.0, 60.0, 75.0, 60.0),
+        (42.0, 50.0, 75.0, 70.0),  # bent between tendons 0 and 1
+        (44.0, 47.0, 75.0, 72.0),
+    ],
+)
 def test_a_tendon_takes_the_shortest_way_through_the_bore(
-    make_driver: MakeDriver, short_mm: float
+    make_driver: MakeDriver, lengths_mm: tuple[float, float, float, float]
 ) -> None:
-    """Tendon 0 in the plane of bending, found again by relaxation in that plane."""
+    """Tendon 0, found again by relaxation from disc to disc of the bore."""
     driver = make_driver({"plant.gravity_m_s2": 0.0})
-    truth = driver.pull([short_mm, 60.0, 75.0, 60.0])
+    truth = driver.pull(lengths_mm)
     path_mm = truth.servo_length_mm[0] + truth.tension_n[0] / TENDON_N_PER_MM
 
-    points = truth.backbone_mm[:, [0, 2]]
-    inner = range(2, 20, 2)  # the stations; the points between give their directions
-    centres = points[list(inner)]
-    along = np.array([points[i + 1] - points[i - 1] for i in inner])
-    across = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    top = truth.rotation[[0, 2]][:, [0, 2]] @ [8.3, 0] + points[-1]
-    ends = np.array([[8.3, 0.0], top])
-    offset = np.full(len(centres), 8.3)
+    points = truth.backbone_mm
+    inner = list(range(2, 20, 2))  # the stations; the points between give their directions
+    centres = points[inner]
+    along = points[[i + 1 for i in inner]] - points[[i - 1 for i in inner]]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    ends = np.array([[8.3, 0.0, 0.0], points[-1] + truth.rotation @ [8.3, 0.0, 0.0]])
+    offset = np.outer(np.full(len(centres), 8.3), [1.0, 0.0, 0.0])
 
-    def string(offset: Array) -> Array:
-        return np.vstack([ends[:1], centres + offset[:, None] * across, ends[1:]])
+    def into_discs(offset: Array) -> Array:
+        offset = offset - (offset * along).sum(axis=1, keepdims=True) * along
+        radius = np.linalg.norm(offset, axis=1, keepdims=True)
+        return np.asarray(offset * np.minimum(1.0, 9.0 / radius))
 
     for _ in range(20_000):
-        steps = np.diff(string(offset), axis=0)
+        string = np.vstack([ends[:1], centres + offset, ends[1:]])
+        steps = np.diff(string, axis=0)
         unit = steps / np.linalg.norm(steps, axis=1, keepdims=True)
-        uphill = ((unit[:-1] - unit[1:]) * across).sum(axis=1)
-        offset = np.clip(offset - 1.0 * uphill, -9, 9)
-    shortest_mm = np.linalg.norm(np.diff(string(offset), axis=0), axis=1).sum()
+        offset = into_discs(offset - (unit[:-1] - unit[1:]))
+    string = np.vstack([ends[:1], centres + offset, ends[1:]])
+    shortest_mm = np.linalg.norm(np.diff(string, axis=0), axis=1).sum()
     straight_mm = np.linalg.norm(ends[1] - ends[0])
     assert shortest_mm > straight_mm + 0.05  # the bore is in the way
-    assert path_mm == pytest.approx(shortest_mm, abs=0.005)
+    assert path_mm == pytest.approx(shortest_mm, abs=0.01)
