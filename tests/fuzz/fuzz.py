@@ -88,7 +88,7 @@ def _commit() -> str:
             command, cwd=ROOT, capture_output=True, text=True, check=True
         ).stdout.strip()
 
-    changed = git("status", "--porcelain", "--", "firmware", "tests/fuzz", f":!{RUNS}")
+    changed = git("status", "--porcelain", "--", "firmware", "tests/fuzz", ":!tests/fuzz/runs.json")
     return git("rev-parse", "--short=10", "HEAD") + ("+" if changed else "")
 
 
