@@ -29,7 +29,16 @@ from setae.link.transport import Transport
 from setae.record import Recorder
 from setae.robot import Robot
 from setae.scene import Scene, tube_scene
-from setae.sim import Follower, SimTransport, SimulatedStage, World, boards, plants, plugin
+from setae.sim import (
+    Follower,
+    SimTransport,
+    SimulatedStage,
+    World,
+    add_solid,
+    boards,
+    plants,
+    plugin,
+)
 from setae.stage import ManualStage, Stage
 from setae.ur import UrStage
 from setae_protocol.messages import (
@@ -274,9 +283,8 @@ def _world(config: Config, scene: Scene, seed: int, foreign: str | None = None) 
         parameters=simulator_parameters(config, seed),
         plant=plugin.make(foreign, config, seed) if foreign else None,
     )
-    world.add_tube(scene.tube_axis_mm, scene.tube_inner_radius_mm)
-    if scene.box is not None:
-        world.add_box(scene.box.centre_mm, scene.box.edges_mm, scene.box.yaw_rad)
+    for solid in scene.solids:
+        add_solid(world, solid)
     world.start((0.0, 0.0, 0.0))
     return world
 
@@ -393,7 +401,7 @@ class Rig:
         return self._log.recorder
 
     def _metadata(self) -> dict[str, Any]:
-        scene, box = self.scene, self.scene.box
+        about = self.scene.describe()
         return {
             "simulated": self.world is not None,
             "seed": self.seed,
@@ -408,21 +416,8 @@ class Rig:
                 "protocol": str(PROTOCOL_VERSION),
                 "numpy": importlib.metadata.version("numpy"),
             },
-            "obstacle_below_tip_mm": scene.obstacle and scene.obstacle.below_tip_mm,
-            "scene": {
-                "tube": {
-                    "axis_mm": list(scene.tube_axis_mm[:2]),
-                    "inner_radius_mm": scene.tube_inner_radius_mm,
-                },
-                "cube": None
-                if box is None
-                else {
-                    "centre_mm": list(box.centre_mm),
-                    "edge_mm": box.edges_mm[0],
-                    "yaw_rad": box.yaw_rad,
-                },
-                "arm_start_mm": list(self.stage.position_mm),
-            },
+            **about,
+            "scene": {**about["scene"], "arm_start_mm": list(self.stage.position_mm)},
         }
 
 

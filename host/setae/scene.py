@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 from setae.config import Config
 from setae.errors import ConfigError, InputError
-
-Point = tuple[float, float, float]
+from setae.solids import Box, Point, Solid, Tube
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,17 +72,21 @@ class Obstacle:
             )
 
 
+class Scene(Protocol):
+    """What the robot hangs in."""
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """What the bristle can touch, in the world."""
+        ...
+
+    def describe(self) -> dict[str, Any]:
+        """For a log's metadata; JSON-ready."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
-    """An upright box in the world, turned by yaw about z."""
-
-    centre_mm: Point
-    edges_mm: Point
-    yaw_rad: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class TubeScene:
     """Tube and obstacle, placed in the world.
 
     Attributes
@@ -102,8 +106,34 @@ class Scene:
     obstacle: Obstacle | None = None
     box: Box | None = None
 
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """Tube and cube."""
+        tube = Tube(axis_mm=self.tube_axis_mm, inner_radius_mm=self.tube_inner_radius_mm)
+        return (tube,) if self.box is None else (tube, self.box)
 
-def tube_scene(config: Config, obstacle: Obstacle | None = None) -> Scene:
+    def describe(self) -> dict[str, Any]:
+        """For a log's metadata; JSON-ready."""
+        box = self.box
+        return {
+            "obstacle_below_tip_mm": self.obstacle and self.obstacle.below_tip_mm,
+            "scene": {
+                "tube": {
+                    "axis_mm": list(self.tube_axis_mm[:2]),
+                    "inner_radius_mm": self.tube_inner_radius_mm,
+                },
+                "cube": None
+                if box is None
+                else {
+                    "centre_mm": list(box.centre_mm),
+                    "edge_mm": box.edges_mm[0],
+                    "yaw_rad": box.yaw_rad,
+                },
+            },
+        }
+
+
+def tube_scene(config: Config, obstacle: Obstacle | None = None) -> TubeScene:
     """Place the configured tube, and an obstacle at its wall.
 
     Parameters
@@ -158,7 +188,7 @@ def tube_scene(config: Config, obstacle: Obstacle | None = None) -> Scene:
             edges_mm=(obstacle.edge_mm, obstacle.edge_mm, obstacle.edge_mm),
             yaw_rad=-azimuth_rad + 0.0,
         )
-    return Scene(
+    return TubeScene(
         tube_axis_mm=(-tube.axis_offset_mm * towards[0], -tube.axis_offset_mm * towards[1], 0.0),
         tube_inner_radius_mm=tube.inner_radius_mm,
         obstacle=obstacle,
@@ -166,7 +196,7 @@ def tube_scene(config: Config, obstacle: Obstacle | None = None) -> Scene:
     )
 
 
-def open_scene(surface_below_mm: float | None = None) -> Scene:
+def open_scene(surface_below_mm: float | None = None) -> TubeScene:
     """Place nothing within reach, or only a flat surface below the robot.
 
     Parameters
@@ -188,4 +218,4 @@ def open_scene(surface_below_mm: float | None = None) -> Scene:
             yaw_rad=0.0,
         )
     # Every scene has walls; these are too far away to matter.
-    return Scene(tube_axis_mm=(0.0, 0.0, 0.0), tube_inner_radius_mm=10_000.0, box=box)
+    return TubeScene(tube_axis_mm=(0.0, 0.0, 0.0), tube_inner_radius_mm=10_000.0, box=box)

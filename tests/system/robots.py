@@ -17,7 +17,7 @@ from setae.link.lossy import Faults, LossyTransport
 from setae.link.session import Session
 from setae.robot import Robot
 from setae.scene import Obstacle, tube_scene
-from setae.sim import SensorFault, SimTransport, SimulatedStage, World
+from setae.sim import SensorFault, SimTransport, SimulatedStage, World, add_solid
 
 # Deep enough, in every direction that matters here, for a probe to find it.
 WALL_AHEAD = Obstacle(below_tip_mm=1.0)
@@ -103,9 +103,8 @@ def bench(
     config = config or load()
     scene = tube_scene(config, obstacle)
     with World(seed=seed, parameters={**dict(config.simulator), **(parameters or {})}) as world:
-        world.add_tube(scene.tube_axis_mm, scene.tube_inner_radius_mm)
-        if scene.box is not None:
-            world.add_box(scene.box.centre_mm, scene.box.edges_mm, scene.box.yaw_rad)
+        for solid in scene.solids:
+            add_solid(world, solid)
         world.start()
         uno = Uno() if back_end == "avr" else None
         line = LossyTransport(

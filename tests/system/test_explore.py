@@ -29,7 +29,8 @@ from setae.experiments.explore import (
     paper_obstacles,
     run_trials,
 )
-from setae.scene import Box, Obstacle, Scene, tube_scene
+from setae.scene import Obstacle, Scene, tube_scene
+from setae.solids import Box
 from setae_protocol.messages import State
 
 DIRECTIONS_DEG = list(oracle.DIRECTIONS_DEG)

@@ -9,6 +9,7 @@ like hardware to the rest of setae.
 from setae.sim import plants, plugin
 from setae.sim.library import SimulationError
 from setae.sim.plugin import PluginError
+from setae.sim.solids import add_solid
 from setae.sim.stage import Follower, SimulatedStage
 from setae.sim.transport import SimTransport
 from setae.sim.world import SensorFault, Truth, World, parameter_names
@@ -22,6 +23,7 @@ __all__ = [
     "SimulationError",
     "Truth",
     "World",
+    "add_solid",
     "parameter_names",
     "plants",
     "plugin",

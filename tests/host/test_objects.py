@@ -1,0 +1,60 @@
+"""Objects that are scanned: where they stand, and that the robot can reach their top."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from setae.config import load
+from setae.errors import InputError
+from setae.objects import SHAPES, ScanObject, random_object, table_scene
+from setae.sim import World, add_solid
+
+AREA_MM = 200.0
+
+
+@given(st.sampled_from(SHAPES), st.integers(0, 10_000))
+def test_random_objects_lie_wholly_in_the_square(shape: str, seed: int) -> None:
+    what = random_object(shape, seed, area_mm=AREA_MM)
+    for middle_mm in (what.x_mm, what.y_mm):
+        assert what.radius_mm - 0.1 <= middle_mm <= AREA_MM - what.radius_mm + 0.1
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("scale", [0.8, 1.0, 1.2])
+def test_the_robot_reaches_the_top_but_not_the_table(shape: str, scale: float) -> None:
+    config = load()
+    what = ScanObject(shape=shape, scale=scale, yaw_deg=30)
+    scene = table_scene(config, what)
+    tip_mm = config.geometry.tip_offset_mm
+    with World(seed=1) as world:
+        for solid in scene.solids:
+            add_solid(world, solid)
+        heights = {
+            (x, y): world.surface_mm(x, y, bottom_mm=scene.table_z_mm - 1, top_mm=0)
+            for x in range(0, 201, 4)
+            for y in range(0, 201, 4)
+        }
+    top_mm = max(heights.values())
+    assert top_mm == pytest.approx(scene.table_z_mm + what.height_mm, abs=0.5)
+    assert -(config.geometry.free_length_mm + tip_mm) < top_mm
+    assert top_mm < -(config.geometry.min_length_mm + tip_mm)
+    # Away from the object there is only the table, and that is out of reach.
+    assert heights[0, 0] == pytest.approx(scene.table_z_mm, abs=1e-3)
+    assert heights[0, 0] < -(config.geometry.free_length_mm + tip_mm)
+    for (x, y), z_mm in heights.items():
+        if math.dist((x, y), (what.x_mm, what.y_mm)) > what.radius_mm:
+            assert z_mm == pytest.approx(scene.table_z_mm, abs=1e-3), "the object is that small"
+
+
+def test_bad_objects_are_refused() -> None:
+    with pytest.raises(InputError, match="no object 'apple'"):
+        ScanObject(shape="apple")
+    with pytest.raises(InputError, match="its scale is 2"):
+        ScanObject(shape="orange", scale=2)
+    with pytest.raises(InputError, match="x_mm is nan"):
+        dataclasses.replace(ScanObject(shape="orange"), x_mm=math.nan)
