@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
 import os
 import select
@@ -12,10 +13,17 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from setae.config import Ur
+
 _SCRIPT = Path(__file__).with_name("fake_controller.py")
 _READY_TIMEOUT_S = 30
 # ur-rtde can't be told a port: each controller has an address of its own.
 _addresses = (f"127.7.{os.getpid() % 250 + 1}.{last}" for last in itertools.count(1))
+
+
+def patient(settings: Ur) -> Ur:
+    """For a busy machine, on which the stand-in may get no turn for a while."""
+    return dataclasses.replace(settings, state_age_s=5.0, command_deadline_s=20.0, watchdog_hz=0.5)
 
 
 class FakeController:

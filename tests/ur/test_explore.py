@@ -6,7 +6,7 @@ import dataclasses
 import threading
 
 import pytest
-from tests.ur.controller import FakeController
+from tests.ur.controller import FakeController, patient
 
 from setae import rig
 from setae.config import Config, load
@@ -19,7 +19,7 @@ from setae_protocol.messages import State
 def quick(step_mm: float = 40.0) -> Config:
     config = load()
     settings = dataclasses.replace(config.explore, steps=1, directions=2, step_mm=step_mm)
-    return dataclasses.replace(config, explore=settings)
+    return dataclasses.replace(config, explore=settings, ur=patient(config.ur))
 
 
 def test_a_trial_finds_the_cube_and_brings_the_arm_back(fake: FakeController) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.ur.controller import FakeController
+from tests.ur.controller import FakeController, patient
 
 from setae.config import Config, load
 from setae.errors import (
@@ -30,13 +30,13 @@ from setae.errors import (
 from setae.ur import UrStage
 from setae.ur.pose import WorldFrame, rotation
 
-TIMEOUT_S = 20.0
+TIMEOUT_S = 60.0
 NEAR_MM = 0.3
 
 
 def with_ur(**changes: Any) -> Config:
     config = load()
-    return dataclasses.replace(config, ur=dataclasses.replace(config.ur, **changes))
+    return dataclasses.replace(config, ur=dataclasses.replace(patient(config.ur), **changes))
 
 
 @contextmanager
@@ -102,7 +102,7 @@ def test_a_start_outside_the_box_is_refused(fake: FakeController) -> None:
 def test_a_flange_that_does_not_look_down_is_refused(fake: FakeController) -> None:
     fake.tell("tilt 0.2")
     with pytest.raises(StageError, match=r"11\.5° off straight down"):
-        UrStage(fake.url, load())
+        UrStage(fake.url, with_ur())
 
 
 @pytest.mark.parametrize(
@@ -120,19 +120,19 @@ def test_an_arm_that_cannot_be_driven_says_why_and_what_to_do(
 ) -> None:
     fake.tell(line)
     with pytest.raises(kind, match=says) as caught:
-        UrStage(fake.url, load())
+        UrStage(fake.url, with_ur())
     assert caught.value.remedy
 
 
 def test_a_refused_connection_is_told_at_once() -> None:
     with pytest.raises(ArmUnreachableError, match=r"No UR controller answers at 127\.0\.0\.250"):
-        UrStage("ur://127.0.0.250", load())
+        UrStage("ur://127.0.0.250", with_ur())
 
 
 @pytest.mark.parametrize("url", ["ur://", "ur:///x", "127.0.0.1"])
 def test_a_url_without_an_address_is_refused(url: str) -> None:
     with pytest.raises(InputError, match="names no arm"):
-        UrStage(url, load())
+        UrStage(url, with_ur())
 
 
 def test_a_frozen_controller_is_noticed_and_told_once(fake: FakeController) -> None:
