@@ -16,6 +16,9 @@ from setae.scene import Obstacle, tube_scene
 from setae_protocol.messages import State
 
 
+ARM_TIMEOUT_S = 120.0  # a busy machine
+
+
 def quick(step_mm: float = 40.0) -> Config:
     config = load()
     settings = dataclasses.replace(config.explore, steps=1, directions=2, step_mm=step_mm)
@@ -29,7 +32,7 @@ def test_a_trial_finds_the_cube_and_brings_the_arm_back(fake: FakeController) ->
         "sim://", config=config, scene=tube_scene(config, obstacle), stage=fake.url
     ) as opened:
         opened.robot.enable()
-        result = explore(opened.robot, opened.stage, obstacle=obstacle)
+        result = explore(opened.robot, opened.stage, obstacle=obstacle, arm_timeout_s=ARM_TIMEOUT_S)
         assert [touch.alpha_deg for touch in result.contacts] == [0.0]
         assert result.descent_mm == pytest.approx(40, abs=0.3)
         assert opened.stage.position_mm == pytest.approx((0, 0, 0), abs=0.3)
@@ -48,7 +51,7 @@ def test_an_arm_that_freezes_while_it_lowers_stops_the_robot(fake: FakeControlle
     with rig.open("sim://", config=config, stage=fake.url) as opened:
         opened.robot.enable()
         with pytest.raises(ArmFrozenError) as caught:
-            explore(opened.robot, opened.stage, on_event=on_event)
+            explore(opened.robot, opened.stage, on_event=on_event, arm_timeout_s=ARM_TIMEOUT_S)
         assert opened.robot.state is State.STOPPED
         assert "can't be told to stop" in "".join(caught.value.__notes__)
         with pytest.raises(StoppedError):
@@ -69,7 +72,7 @@ def test_a_contact_while_the_arm_lowers_stops_the_arm(fake: FakeController) -> N
     )
     with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
         opened.robot.enable()
-        result = explore(opened.robot, opened.stage)
+        result = explore(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
         (touch,) = result.contacts
         assert touch.alpha_deg is None
         assert 30 < touch.descent_mm < 50, "the arm stopped soon after the touch"
