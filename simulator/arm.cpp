@@ -5,12 +5,18 @@
 
 namespace setae {
 namespace sim {
+namespace {
+
+constexpr double kFollowRate = 15;  // per second: it is 0.13 s behind an even motion
+
+}  // namespace
 
 void Arm::place(const Vec3& position_mm) {
   start_mm_ = target_mm_ = position_mm;
   direction_ = {0, 0, 0};
   distance_mm_ = 0;
   phases_ = {};
+  following_ = false;
 }
 
 void Arm::move(int64_t now_us, const Vec3& target_mm, double speed_mm_s,
@@ -31,19 +37,20 @@ void Arm::move(int64_t now_us, const Vec3& target_mm, double speed_mm_s,
               {ramp_s, -acceleration_mm_s2}}};
 }
 
-void Arm::follow(int64_t now_us, const Vec3& target_mm, int64_t duration_us) {
-  place(position_mm(now_us));
+void Arm::follow(int64_t now_us, const Vec3& leader_mm) {
+  const Vec3 here = position_mm(now_us);
+  Vec3 velocity = {0, 0, 0};
+  if (following_) {
+    // The derivative of what position_mm() gives.
+    const double t = 1e-6 * static_cast<double>(now_us - start_us_);
+    const Vec3 pull = velocity_mm_s_ + kFollowRate * behind_mm_;
+    velocity = std::exp(-kFollowRate * t) * (velocity_mm_s_ - (kFollowRate * t) * pull);
+  }
+  place(leader_mm);
   start_us_ = now_us;
-  start_speed_mm_s_ = 0;
-  const Vec3 way = target_mm - start_mm_;
-  distance_mm_ = norm(way);
-  if (distance_mm_ == 0)
-    return;
-  target_mm_ = target_mm;
-  direction_ = (1 / distance_mm_) * way;
-  const double duration_s = 1e-6 * static_cast<double>(duration_us);
-  start_speed_mm_s_ = distance_mm_ / duration_s;
-  phases_[0] = {duration_s, 0};
+  following_ = true;
+  behind_mm_ = here - leader_mm;
+  velocity_mm_s_ = velocity;
 }
 
 void Arm::stop(int64_t now_us, double acceleration_mm_s2) {
@@ -77,6 +84,11 @@ Arm::Motion Arm::at(int64_t now_us) const {
 }
 
 Vec3 Arm::position_mm(int64_t now_us) const {
+  if (following_) {
+    const double t = 1e-6 * static_cast<double>(now_us - start_us_);
+    const Vec3 pull = velocity_mm_s_ + kFollowRate * behind_mm_;
+    return target_mm_ + std::exp(-kFollowRate * t) * (behind_mm_ + t * pull);
+  }
   const Motion motion = at(now_us);
   return motion.ended ? target_mm_ : start_mm_ + motion.along_mm * direction_;
 }

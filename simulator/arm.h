@@ -17,8 +17,9 @@ class Arm {
 
   // The arm must be at rest.
   void move(int64_t now_us, const Vec3& target_mm, double speed_mm_s, double acceleration_mm_s2);
-  // Goes there at an even speed: where something outside the world moves the arm.
-  void follow(int64_t now_us, const Vec3& target_mm, int64_t duration_us);
+  // Something outside the world moves the arm and is there now. That is told in steps, and late
+  // ones are large: so the arm comes after it smoothly, as a mass on a critically damped spring.
+  void follow(int64_t now_us, const Vec3& leader_mm);
   // Brakes on the present line, never beyond its end.
   void stop(int64_t now_us, double acceleration_mm_s2);
 
@@ -43,6 +44,10 @@ class Arm {
   int64_t start_us_ = 0;
   double start_speed_mm_s_ = 0;
   std::array<Phase, 3> phases_{};
+  // While it follows: how far it was from its leader, and how fast, at start_us_.
+  bool following_ = false;
+  Vec3 behind_mm_{};
+  Vec3 velocity_mm_s_{};
 };
 
 }  // namespace sim

@@ -371,17 +371,14 @@ SETAE_EXPORT int setae_world_arm_move(setae_world* world, const double target_mm
   return 0;
 }
 
-SETAE_EXPORT int setae_world_arm_follow(setae_world* world, const double position_mm[3],
-                                        int64_t duration_us) {
+SETAE_EXPORT int setae_world_arm_follow(setae_world* world, const double position_mm[3]) {
   if (!world->world)
     return fail(world, kWrongTime, kNotStarted);
   Vec3 position;
   if (!read(position_mm, position)) {
     return fail(world, kBadArgument, "position_mm must be three finite numbers");
   }
-  if (duration_us <= 0)
-    return fail(world, kBadArgument, "duration_us must be positive");
-  world->world->arm().follow(world->world->now_us(), position, duration_us);
+  world->world->arm().follow(world->world->now_us(), position);
   return 0;
 }
 

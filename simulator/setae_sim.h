@@ -104,8 +104,8 @@ int setae_world_run(setae_world*, int64_t until_us, uint8_t* data, size_t* size)
 /* Linear move of the arm with a trapezoidal speed profile; starts now. */
 int setae_world_arm_move(setae_world*, const double target_mm[3], double speed_mm_s,
                          double acceleration_mm_s2);
-/* Something outside the world moves the arm: go there at an even speed, from wherever it is. */
-int setae_world_arm_follow(setae_world*, const double position_mm[3], int64_t duration_us);
+/* Something outside the world moves the arm and is there now; the arm comes after it smoothly. */
+int setae_world_arm_follow(setae_world*, const double position_mm[3]);
 int setae_world_arm_stop(setae_world*, double acceleration_mm_s2);
 
 int setae_world_truth(const setae_world*, setae_truth* out);

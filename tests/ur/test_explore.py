@@ -15,7 +15,6 @@ from setae.experiments.explore import Event, explore
 from setae.scene import Obstacle, tube_scene
 from setae_protocol.messages import State
 
-
 ARM_TIMEOUT_S = 120.0  # a busy machine
 
 
@@ -37,7 +36,7 @@ def test_a_trial_finds_the_cube_and_brings_the_arm_back(fake: FakeController) ->
         assert result.descent_mm == pytest.approx(40, abs=0.3)
         assert opened.stage.position_mm == pytest.approx((0, 0, 0), abs=0.3)
         assert opened.world is not None
-        opened.robot.session.run_for(100_000)
+        opened.robot.session.run_for(1_000_000)
         assert opened.world.arm_mm == pytest.approx(opened.stage.position_mm, abs=0.01)
 
 

@@ -162,7 +162,7 @@ def load() -> ctypes.CDLL:
         "send": (status, (world, c_char_p, c_size_t)),
         "run": (status, (world, c_int64, c_char_p, POINTER(c_size_t))),
         "arm_move": (status, (world, vector, c_double, c_double)),
-        "arm_follow": (status, (world, vector, c_int64)),
+        "arm_follow": (status, (world, vector)),
         "arm_stop": (status, (world, c_double)),
         "truth": (status, (world, POINTER(CTruth))),
         "sensor_fault": (status, (world, c_int)),

@@ -14,9 +14,6 @@ from setae.sim.world import World
 
 __all__ = ["Follower", "SimulatedStage"]
 
-# The session polls at least this often: the world's arm is that far behind.
-_FOLLOW_US = 20_000
-
 
 class HasPosition(Protocol):
     """What moves the arm from outside."""
@@ -44,7 +41,7 @@ class Follower:
         position_mm = self._stage.position_mm
         if position_mm != self._followed_mm:
             self._followed_mm = position_mm
-            self._world.arm_follow(position_mm, _FOLLOW_US)
+            self._world.arm_follow(position_mm)
 
 
 class SimulatedStage:

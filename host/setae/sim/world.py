@@ -338,16 +338,10 @@ class World:
             self._library.setae_world_arm_move(self._live, target, speed_mm_s, acceleration_mm_s2)
         )
 
-    def arm_follow(self, position_mm: Sequence[float], duration_us: int) -> None:
-        """Let the arm go where something outside the world has it, at an even speed.
-
-        Raises
-        ------
-        InputError
-            A value is no good.
-        """
+    def arm_follow(self, position_mm: Sequence[float]) -> None:
+        """Say where something outside the world has the arm now; it comes after it smoothly."""
         position = _vector("position_mm", position_mm)
-        self._change(self._library.setae_world_arm_follow(self._live, position, duration_us))
+        self._change(self._library.setae_world_arm_follow(self._live, position))
 
     def arm_stop(self, acceleration_mm_s2: float) -> None:
         """Brake the arm on its present line."""
