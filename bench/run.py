@@ -23,6 +23,7 @@ sys.path.insert(0, str(ROOT))
 
 from bench import arm, avr_figures, damage, elf, kinematics, line, link_model, motion  # noqa: E402  # needs the path
 from bench import plant as plant_figures  # noqa: E402
+from bench import validation  # noqa: E402
 from bench.figure import Figure  # noqa: E402
 from tests.system import oracle  # noqa: E402
 
@@ -275,6 +276,7 @@ FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     **arm.FIGURES,
     **damage.FIGURES,
     **link_model.FIGURES,
+    **validation.FIGURES,
     "random_obstacles": random_obstacles,
     "kinematics_speed": kinematics_speed,
     "motion_segments": motion_segments,

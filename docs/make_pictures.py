@@ -2,8 +2,9 @@
 
     python docs/make_pictures.py [RUN_DIR]
 
-Without a folder it runs the paper's five trials in the simulator, seed 0. With
-one it draws the logs in it. The theory's and the protocol's pictures it draws in any case.
+Without a folder it runs the paper's five trials, its validation and the bristle's
+calibration in the simulator, seed 0. With one it draws the logs in it. The theory's
+and the protocol's pictures it draws in any case.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ import motion_pictures
 import protocol_pictures
 import theory_pictures
 
-from setae.report import explore, pictures
+from setae import record, tendons
+from setae.experiments import causes, runs
+from setae.report import bristle, explore, pictures, validation_pictures
+from setae.report import causes as why
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 
@@ -27,6 +31,29 @@ def draw(run: Path) -> None:
     trials = explore.trials(run)
     pictures.write_all(PICTURES, trials)
     pictures.animation(PICTURES / "explore.gif", pictures.telling(trials))
+
+
+def draw_validation(run: Path) -> None:
+    """Draw a validation into docs/pictures."""
+    found = runs.read(record.read(log) for log in sorted(run.glob("*.mcap")))
+    validation_pictures.boxes_picture(PICTURES / "validation.png", found)
+    validation_pictures.bubbles_picture(PICTURES / "bubbles.png", found[:1])
+    validation_pictures.targets_picture(PICTURES / "targets.png", found)
+
+
+def draw_causes(run: Path) -> None:
+    """Draw what each imperfection costs into docs/pictures."""
+    study = record.read(run / f"{causes.EXPERIMENT}.mcap")
+    effects = causes.effects(study)
+    targets = study.events("case")[0].data["targets"]
+    note = f"Simulated, plant {study.metadata['plant']}, {targets} targets."
+    why.picture(PICTURES / "causes.png", effects, note)
+
+
+def run_setae(*arguments: str) -> None:
+    """Run the command in the simulator, without its report."""
+    command = [sys.executable, "-m", "setae.cli", *arguments, "--sim", "--no-report"]
+    subprocess.run(command, check=True)
 
 
 def main(arguments: list[str]) -> None:
@@ -39,9 +66,19 @@ def main(arguments: list[str]) -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "run"
-        command = [sys.executable, "-m", "setae.cli", "explore", "--sim", "--no-report"]
-        subprocess.run([*command, "--out", str(run)], check=True)
+        run_setae("explore", "--out", str(run))
         draw(run)
+        validated = Path(folder) / "validate"
+        models = [text for name in tendons.MODELS for text in ("--model", name)]
+        like = ("validate", "--plant", "paper_like")
+        run_setae(*like, *models, "--out", str(validated))
+        draw_validation(validated)
+        part = Path(folder) / "causes"
+        run_setae(*like, "--targets", "40", "--causes", "--out", str(part))
+        draw_causes(part)
+        felt = Path(folder) / "bristle"
+        run_setae("calibrate", "bristle", "--moves", "200", "--touches", "200", "--out", str(felt))
+        bristle.picture(PICTURES / "bristle.png", record.read(felt / "bristle.mcap"))
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from setae_protocol.messages import (
     Reflex,
     Refusal,
     RefusalMessage,
+    Sensor,
     State,
     TripCause,
 )
@@ -151,12 +152,16 @@ class Guarding:
         return self.contact_of(trip)
 
     def _arm(self, limit_s: float, reflex: Reflex, retract_ticks: Ticks) -> None:
-        """Have the baseline taken. A bristle that still swings gets another chance."""
+        """Have the baseline taken. A bristle that still swings gets another chance.
+
+        So does one that was shaken so hard that the board took its sensor for broken.
+        """
         for attempt in range(1, _TARE_ATTEMPTS + 1):
             refusal = self._try_to_arm(limit_s, reflex, retract_ticks)
             if refusal is None:
                 return
-            if refusal.reason not in _RETRIED or attempt == _TARE_ATTEMPTS:
+            shaken = refusal.reason is Refusal.SENSOR_UNAVAILABLE and refusal.value == Sensor.NOISY
+            if not (shaken or refusal.reason in _RETRIED) or attempt == _TARE_ATTEMPTS:
                 raise refused_error(refusal)
             self._board.pause(_TARE_S)
 
