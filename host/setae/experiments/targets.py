@@ -137,7 +137,7 @@ def choose(targets: Sequence[Target], count: int) -> tuple[Target, ...]:
     --------
     >>> from setae.config import load
     >>> [target.label for target in choose(paper_targets(load()), 5)]
-    ['C z50', '+X z50 b10', '-X z50 b10', '+Y z50 b10', '-Y z50 b10']
+    ['C z50', '+X z45 b80', '-X z45 b80', '+Y z45 b80', '-Y z45 b80']
     """
     if count < len(GROUPS):
         raise InputError(f"{count} targets are too few.", f"Give {len(GROUPS)} or more.")
@@ -145,8 +145,9 @@ def choose(targets: Sequence[Target], count: int) -> tuple[Target, ...]:
     chosen: list[Target] = []
     for part in by_group:
         some = max(1, round(count * len(part) / len(targets)))
-        places = (np.arange(some) + 0.5) / some * len(part)
-        chosen += [part[index] for index in sorted({int(place) for place in places})]
+        ends = (0, len(part) - 1) if some > 1 else ((len(part) - 1) / 2,) * 2
+        places = np.linspace(*ends, some).round().astype(int)
+        chosen += [part[place] for place in places]
     return tuple(chosen)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from setae.experiments.causes import MODEL, Effect
-from setae.report import extras, palette, paper, style, template
+from setae.report import extras, palette, style, template
 
 __all__ = ["picture", "section"]
 
@@ -19,7 +19,7 @@ _ADD = palette.BRISTLE
 
 def picture(path: Path, effects: Sequence[Effect], note: str) -> Path:
     """Draw what each cause adds alone, and what mending it gains, the largest gain first."""
-    patches, lines = extras.load("matplotlib.patches"), extras.load("matplotlib.lines")
+    patches = extras.load("matplotlib.patches")
     none_mm, all_mm = effects[0].none_mm, effects[0].all_mm
     with style.used():
         figure = style.figure(10.5, 2.3 + 0.52 * len(effects))
@@ -47,8 +47,6 @@ def picture(path: Path, effects: Sequence[Effect], note: str) -> Path:
                 )  # fmt: skip
         for value, colour in ((none_mm, _ADD), (all_mm, _GAIN)):
             axes.axvline(value, color=colour, lw=1.2, ls=(0, (4, 2)), zorder=1)
-        axes.axvline(paper.validation()["all"].distance.mean_mm, color=palette.INK, lw=1.4,
-                     zorder=1)  # fmt: skip
         axes.set_yticks(
             range(len(effects)),
             [effect.cause for effect in effects],
@@ -69,9 +67,8 @@ def picture(path: Path, effects: Sequence[Effect], note: str) -> Path:
                 patches.Patch(color=_ADD, alpha=0.85, label=f"it alone, from {none_mm:.2f} mm"),
                 patches.Patch(color=_GAIN, alpha=0.85, label=f"it mended, from {all_mm:.2f} mm"),
                 patches.Patch(color=palette.CONTACT, alpha=0.85, label="mending it alone is worse"),
-                lines.Line2D([], [], color=palette.INK, lw=1.4, label="the paper’s robot"),
             ],
-            loc="center right", bbox_to_anchor=(0.985, 1 - 0.95 / high), ncols=4, frameon=False,
+            loc="center right", bbox_to_anchor=(0.985, 1 - 0.95 / high), ncols=3, frameon=False,
             fontsize=9.5,
         )  # fmt: skip
         style.save(figure, path)

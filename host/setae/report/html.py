@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from setae.report import drawing, extras, palette, paper, shapes, template
+from setae.report import drawing, extras, imperfections, palette, paper, shapes, template
 from setae.report.pictures import floor_mm, origin_note
 from setae.report.tables import Comparison, compare
 from setae.report.trial import Trial
@@ -45,6 +45,7 @@ def page(trials: Sequence[Trial]) -> str:
         "finding": html.escape(finding(rows)),
         "cube_edge": f"{max(edges):g} mm" if edges else "40 mm",
         "table": _table(rows),
+        "imperfections": imperfections.section(trials),
         "coils": ", but for the spring’s coils, which are fewer here than in the real spring",
         "threshold": f"{first.threshold_hpa:g} hPa",
         "compressed": f"{explore.compressed_length_mm:g} mm",

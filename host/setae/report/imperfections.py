@@ -1,0 +1,106 @@
+"""What a simulated robot's imperfections did to an exploration, from the simulator's truth."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from setae.report.tables import compare
+from setae.report.trial import Contact, Trial
+
+__all__ = ["section", "sentences"]
+
+_SLACK_N = 0.02
+_BEFORE_US = 250_000
+
+
+def section(trials: Sequence[Trial]) -> str:
+    """Return the page's part about it; empty for a real robot and for the ideal one."""
+    told = sentences(trials)
+    if not told:
+        return ""
+    items = "".join(f"<li>{html.escape(text)}</li>" for text in told)
+    return f'<h2 id="plant">What the imperfections did</h2><ol>{items}</ol>'
+
+
+def sentences(trials: Sequence[Trial]) -> list[str]:
+    """Say where the tip was beside its target, and how each stop came about that differs."""
+    first = trials[0]
+    parameters = first.log.metadata.get("plant_parameters") or {}
+    if not first.simulated or not parameters:
+        return []
+    told = []
+    beside_mm = [value for trial in trials for value in _beside_mm(trial)]
+    if beside_mm:
+        told.append(
+            f"The simulated robot is the plant {first.log.metadata.get('plant')}. Where nothing "
+            f"was touched, the spring’s top ended {np.mean(beside_mm):.1f} mm from its target on "
+            f"average, {max(beside_mm):.1f} mm at most."
+        )
+    differing = [
+        row.trial for row in compare(trials) if row.agrees is False or not row.trial.complete
+    ]
+    for trial in differing:
+        told += [f"Trial {trial.number} {text}" for text in _why(trial)]
+    if beside_mm and not differing:
+        told.append("Every trial came out as the paper’s all the same.")
+    return told
+
+
+def _beside_mm(trial: Trial) -> list[float]:
+    """How far the spring's top ended from the target of each free extension."""
+    found: list[float] = []
+    times_us = trial.log.times_us("/truth")
+    if not times_us.size:
+        return found
+    top_mm = trial.log.array("/truth", "backbone_mm")[:, -1]
+    starts = {}
+    for event in trial.log.events("direction_start", "direction_end"):
+        if event.name == "direction_start":
+            starts[event.data["alpha_deg"]] = event.data.get("target_mm")
+        elif not event.data.get("touched"):
+            target_mm = starts.get(event.data["alpha_deg"])
+            index = int(np.searchsorted(times_us, event.time_us)) - 1
+            if target_mm is not None and index >= 0:
+                found.append(math.dist(top_mm[index], target_mm))
+    return found
+
+
+def _why(trial: Trial) -> list[str]:
+    told = [text for contact in trial.contacts[:3] if (text := _in_the_air(trial, contact))]
+    if not trial.complete:
+        told.append(f"ended early: {trial.problem or 'its log ends before it does'}")
+    if not told:
+        felt = "something" if trial.touched else "nothing"
+        told.append(
+            f"went {trial.descent_mm:g} mm down and truly touched {felt}: its bristle went other "
+            "ways than commanded."
+        )
+    return told
+
+
+def _in_the_air(trial: Trial, contact: Contact) -> str:
+    """How a contact came about in which the true bristle touched nothing; else empty."""
+    if np.isfinite(contact.true_point_mm).all() or not trial.log.times_us("/truth").size:
+        return ""
+    where = "while the arm lowered" if contact.alpha_deg is None else f"at {contact.alpha_deg:g}°"
+    text = (
+        f"stopped {where}, {contact.descent_mm:g} mm down, by a change of "
+        f"{contact.change_hpa:+.1f} hPa, though the bristle touched nothing"
+    )
+    times_us = trial.log.times_us("/truth")
+    near = (times_us > contact.time_us - _BEFORE_US) & (times_us < contact.time_us + 60_000)
+    tension_n = trial.log.array("/truth", "tension_n")[near]
+    if len(tension_n) > 1:
+        slack = tension_n[:-1] < _SLACK_N
+        caught = (slack & (tension_n[1:] >= _SLACK_N)).any(axis=0)
+        if caught.any():
+            names = " and ".join(str(index) for index in np.flatnonzero(caught))
+            which = f"tendon {names}" if caught.sum() == 1 else f"tendons {names}"
+            return f"{text}: {which} had hung slack, and coming taut jerked the spring."
+        if slack.any():
+            return f"{text}: a tendon hung slack, and the spring went where the others pulled it."
+    return f"{text}: the move itself shook it."
