@@ -21,9 +21,18 @@ ROOT = Path(__file__).resolve().parents[1]
 # The oracle that judges explorations is the tests' own.
 sys.path.insert(0, str(ROOT))
 
-from bench import arm, avr_figures, damage, elf, kinematics, line, link_model, motion  # noqa: E402  # needs the path
+from bench import (  # noqa: E402  # needs the path
+    arm,
+    avr_figures,
+    damage,
+    elf,
+    kinematics,
+    line,
+    link_model,
+    motion,
+    validation,
+)
 from bench import plant as plant_figures  # noqa: E402
-from bench import validation  # noqa: E402
 from bench.figure import Figure  # noqa: E402
 from tests.system import oracle  # noqa: E402
 

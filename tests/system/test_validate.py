@@ -154,7 +154,7 @@ def test_a_real_robot_waits_for_pictures_and_is_measured_by_a_file(
             "--accept-jump",
         )  # fmt: skip
     assert code == 0, errors
-    assert "5 of 5: -Y z50 b10" in printed
+    assert "5 of 5: -Y z45 b80" in printed
     assert "none measured" in printed
     assert not (out / "report.html").exists()
     driven = choose(paper_targets(load()), 5)

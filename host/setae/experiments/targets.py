@@ -145,9 +145,9 @@ def choose(targets: Sequence[Target], count: int) -> tuple[Target, ...]:
     chosen: list[Target] = []
     for part in by_group:
         some = max(1, round(count * len(part) / len(targets)))
-        ends = (0, len(part) - 1) if some > 1 else ((len(part) - 1) / 2,) * 2
-        places = np.linspace(*ends, some).round().astype(int)
-        chosen += [part[place] for place in places]
+        last = len(part) - 1
+        places = np.linspace(0, last, some) if some > 1 else np.array([last / 2])
+        chosen += [part[int(place)] for place in places.round()]
     return tuple(chosen)
 
 
