@@ -7,10 +7,11 @@ namespace sim {
 namespace {
 
 constexpr int kIterations = 40;
-constexpr int kPatience = 6;          // iterations before the secant is built afresh
+constexpr int kPatience = 10;         // iterations before the secant is built afresh
 constexpr double kLongestStep = 4;    // root of N mm; half the spring's whole compression
 constexpr double kSecantStep = 1e-4;  // root of N mm
 constexpr double kCreep = 1e-4;       // root of N mm a step
+constexpr double kSlack_mm = 0.5;     // tendons looser than this need no exact path
 constexpr double kLargestShift = 1e6;
 constexpr double kNudge = 1e-3;        // root of N mm; moves the tip by 0.02 mm or so
 constexpr double kSolidPenalty = 100;  // times the spring's axial stiffness
@@ -132,7 +133,7 @@ void Plant::evaluate(const Modes& modes, State& state) {
   state.geometric = Modes{};
   for (int i = 0; i < kTendons; ++i) {
     state.paths[i].solve(state.shape, settings_.base_hole_mm[i], settings_.top_hole_mm[i],
-                         settings_.bore_radius_mm);
+                         settings_.bore_radius_mm, lengths_mm_[i] - kSlack_mm);
     const double stretch = state.paths[i].length_mm() - lengths_mm_[i];
     state.tension_n[i] = stretch > 0 ? settings_.tendon_stiffness_n_per_mm * stretch : 0;
     if (stretch <= 0)

@@ -12,8 +12,10 @@ namespace sim {
 class TendonPath {
  public:
   // Finds the path from `base` (on the base plate, frame D) to the hole `top` (in
-  // the last station's frame). Starts from the path of the last call.
-  void solve(const Shape& shape, const Vec3& base, const Vec3& top, double bore_radius_mm);
+  // the last station's frame). Starts from the path of the last call. Any path shorter than
+  // `slack_mm` will do: the tendon is slack then.
+  void solve(const Shape& shape, const Vec3& base, const Vec3& top, double bore_radius_mm,
+             double slack_mm);
 
   // Length, a soft bore's small energy included: exactly the function whose
   // gradient wrenches() holds.
@@ -32,7 +34,7 @@ class TendonPath {
 
  private:
   bool straight(const Shape& shape, double bore_radius_mm);
-  void bend(const Shape& shape, double bore_radius_mm);
+  void bend(const Shape& shape, double bore_radius_mm, double slack_mm);
 
   struct Crossing {
     double u, v;
