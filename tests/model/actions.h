@@ -105,8 +105,8 @@ static int board_alone(World* w, int action) {
       if (w->faults == limits.faults)
         return 0;
       ++w->faults;
-      b->sensor_bad = b->guard == GUARD_ARMED;
-      board_fault(b);
+      b->sensor_bad |= b->guard == GUARD_ARMED;
+      board_fault(b, b->guard == GUARD_ARMED);
       w->latched = 1;
       break;
     case DO_sensor_recovers:
@@ -133,7 +133,8 @@ static int board_alone(World* w, int action) {
       ++w->resets;
       board_reset(b);
       ++w->era;
-      w->latched = w->enabled = 0;
+      w->enabled = 0;
+      w->latched = b->switch_open;
       memset(w->down, 0, sizeof w->down);  // a board that starts is deaf
       break;
     default:

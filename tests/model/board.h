@@ -81,16 +81,13 @@ typedef struct {
 typedef struct {
   Byte mode, epoch, session, expected;
   Byte attached, queued, guard, sensor_bad, switch_open;
+  Byte of_sensor;  // the latched fault is
   Byte stop_known, stop_number, stop_session;
   Byte receipt, hello, token, pong, pong_token, telemetry;  // what is to be sent
   Byte guard_sequence, guard_command;                       // of the guard that is on
   Byte never;  // the table was asked what it says never happens
   Latch latch[LATCHES];
 } Board;
-
-static int is_command(int kind) {
-  return kind >= ENABLE && kind < COMMANDS_END;
-}
 
 static int cell(const Board* b, int event) {
   if (plant == PLANT_STOP_UNLATCHED && event == EVENT_STOP && b->mode == MODE_PLAYING)
@@ -160,7 +157,7 @@ static int resume(Board* b, const Down* m) {
     return REFUSED;
   if (record_pending(b) && b->mode != MODE_REFLEX)
     return REFUSED;
-  if ((b->mode == MODE_FAULT && b->sensor_bad) || b->switch_open)
+  if ((b->mode == MODE_FAULT && b->of_sensor && b->sensor_bad) || b->switch_open)
     return REFUSED;
   return happen(b, b->attached == DETACHED   ? EVENT_RESUME_DETACHED
                    : b->attached == ATTACHED ? EVENT_RESUME_ATTACHED
@@ -319,13 +316,15 @@ static void board_switched_off(Board* b) {
   happen(b, EVENT_STOP);
 }
 
-static void board_fault(Board* b) {
+static void board_fault(Board* b, int of_sensor) {
   drop_plans(b);
   happen(b, EVENT_FAULT);
-  if (b->latch[FAULT].pending)
+  if (b->latch[FAULT].pending) {
     b->latch[FAULT].repeat = 1;  // it counts one more
-  else
+  } else {
     latch(b, FAULT, 0);
+    b->of_sensor = (Byte)of_sensor;
+  }
 }
 
 static void board_tared(Board* b) {
@@ -361,22 +360,14 @@ static void board_attached(Board* b) {
   happen(b, EVENT_ATTACHED);
 }
 
-// A servo frame begins.
-static void board_frame(Board* b) {
-  int which;
-  for (which = 0; which < LATCHES; ++which)
-    if (b->latch[which].pending && plant != PLANT_RECORD_ONCE)
-      b->latch[which].repeat = 1;
-  b->telemetry = b->session != 0;
-}
-
 static void board_reset(Board* b) {
-  static const Board kNew;
+  static Board fresh;
   const Board before = *b;
   int which;
-  *b = kNew;
+  *b = fresh;
   b->sensor_bad = before.sensor_bad;
   b->switch_open = before.switch_open;
+  b->of_sensor = before.of_sensor;
   for (which = 0; which < LATCHES; ++which) {
     b->latch[which] = before.latch[which];
     b->latch[which].repeat = b->latch[which].pending;
@@ -384,4 +375,6 @@ static void board_reset(Board* b) {
   }
   if (plant == PLANT_RESET_KEEPS_SESSION)
     b->session = before.session;
+  if (b->switch_open)
+    board_switched_off(b);
 }

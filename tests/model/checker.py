@@ -208,7 +208,7 @@ WHOLE = (
     ),
     Scope(
         name="handshake", what="a session that opens, and a stop meanwhile",
-        kinds=("segments",), commands=1, stops=1, handshake=True, eras=3,
+        kinds=("segments",), commands=1, stops=1, handshake=True, eras=2,
     ),
     Scope(
         name="hosts", what="a host that is killed in motion, and the next one",

@@ -38,6 +38,10 @@ typedef struct {
   Ticket recent[REMEMBERED];  // oldest first; kind 0: none
 } Host;
 
+static int is_command(int kind) {
+  return kind >= ENABLE && kind < COMMANDS_END;
+}
+
 static int in_session(const Host* h) {
   return h->phase == SETTLING || h->phase == OPEN;
 }

@@ -162,6 +162,15 @@ static void report(World* w) {
 
 // --------------------------------------------------------------------------- the board
 
+// A servo frame begins.
+static void board_frame(Board* b) {
+  int which;
+  for (which = 0; which < LATCHES; ++which)
+    if (b->latch[which].pending && plant != PLANT_RECORD_ONCE)
+      b->latch[which].repeat = 1;
+  b->telemetry = b->session != 0;
+}
+
 static int moves(int mode) {
   return mode == MODE_ATTACHING || mode == MODE_HOLDING || mode == MODE_PLAYING ||
          mode == MODE_UNWINDING || mode == MODE_REFLEX;
@@ -429,13 +438,16 @@ static int host_stops_again(World* w) {
 
 static int host_asks_again(World* w) {
   const Host* h = &w->host;
-  if (h->phase == ASKING || h->phase == OPENING)
+  if (h->phase == ASKING || h->phase == OPENING) {
     send_hello(w, h->phase == ASKING ? 0 : h->session);
-  else if (h->phase == SETTLING)
+    return 1;
+  }
+  if (h->phase == SETTLING)
     send_settle(w);
-  else if (in_session(h) && w->board.session != h->session)
-    send_hello(w, 0);  // silence; where the session lives, the answer changes nothing
+  // Silence; where the session lives, the answer changes nothing.
+  if (in_session(h) && w->board.session != h->session)
+    send_hello(w, 0);
   else
-    return 0;
+    return h->phase == SETTLING;
   return 1;
 }
