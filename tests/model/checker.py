@@ -227,7 +227,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--small", action="store_true", help="only the scopes of the tests")
     parser.add_argument("--only", nargs="+", choices=[scope.name for scope in WHOLE])
     options = parser.parse_args(arguments)
-    scopes: Sequence[Scope] = SMALL if options.small else WHOLE
+    scopes: tuple[Scope, ...] = SMALL if options.small else WHOLE
     if options.only:
         scopes = tuple(scope for scope in WHOLE if scope.name in options.only)
     states = 0

@@ -23,12 +23,13 @@ enum { DOWN_SLOTS = 2, UP_SLOTS = 1, COMMANDS_MAX = 8, HOSTS_MAX = 6 };
 enum { ROUNDS = 24 };  // of a fair line, until all must have arrived
 
 // What must not happen.
-#define WRONGS(X)                                                                          \
-  X(ALL_RIGHT)                                                                             \
-  X(MOVES_WITHOUT_ENABLE)                                                                  \
-  X(MOVES_THOUGH_LATCHED) X(OLD_EPOCH_QUEUED) X(RESUMED_BLINDLY) X(STOP_IGNORED)           \
-      X(STOP_CONFIRMED_TOO_EARLY) X(TWICE_OR_OUT_OF_ORDER) X(WRONG_VERDICT) X(RECORD_LOST) \
-          X(RECORD_TWICE) X(TABLE_SAYS_NEVER) X(INCONSISTENT) X(NOT_DELIVERED) X(DEAD_END)
+// clang-format off
+#define WRONGS(X) \
+  X(ALL_RIGHT) X(MOVES_WITHOUT_ENABLE) X(MOVES_THOUGH_LATCHED) X(OLD_EPOCH_QUEUED) \
+  X(RESUMED_BLINDLY) X(STOP_IGNORED) X(STOP_CONFIRMED_TOO_EARLY) X(TWICE_OR_OUT_OF_ORDER) \
+  X(WRONG_VERDICT) X(RECORD_LOST) X(RECORD_TWICE) X(TABLE_SAYS_NEVER) X(INCONSISTENT) \
+  X(NOT_DELIVERED) X(DEAD_END)
+// clang-format on
 #define NAME(wrong) wrong,
 enum { WRONGS(NAME) };
 #undef NAME

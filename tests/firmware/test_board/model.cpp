@@ -421,4 +421,16 @@ TEST_CASE("the model does what the board does, from every state within six event
   CHECK(known.size() > 100);
 }
 
+TEST_CASE("a model that does something else is noticed") {
+  model::plant = model::PLANT_STOP_KEEPS_QUEUE;
+  Pair pair;
+  for (Act act : {Act::kEnable, Act::kTimePasses, Act::kSegments}) {
+    pair.act(act);
+    CHECK(pair.difference() == "");
+  }
+  pair.act(Act::kStop);
+  CHECK(pair.difference() == "queued is 0, in the model 1; ");
+  model::plant = model::NO_PLANT;
+}
+
 }  // namespace setae
