@@ -21,10 +21,10 @@ from tests.fuzz.building import BUILD, HERE, MAX_BYTES, ROOT, TARGETS
 RUNS = HERE / "runs.json"
 
 
-def options(target: str) -> list[str]:
+def options(target: str, max_bytes: int | None = None) -> list[str]:
     """Return what libFuzzer is told in every run."""
     return [
-        f"-max_len={MAX_BYTES[target]}",
+        f"-max_len={max_bytes or MAX_BYTES[target]}",
         "-timeout=5",
         "-detect_leaks=0",
         "-print_final_stats=1",
@@ -42,14 +42,17 @@ def check(target: str, runs: int, seed: int = 1) -> subprocess.CompletedProcess[
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def run_long(target: str, seconds: int, jobs: int, corpus: Path) -> bool:
+def run_long(
+    target: str, seconds: int, jobs: int, corpus: Path, max_bytes: int | None = None
+) -> bool:
     """Fuzz a target, keep what it finds in `corpus`, and write the run down.
 
     Jobs share the corpus: each reads what the others have found.
     """
     building.unpack(target, corpus)
     program = building.fuzzer(target)
-    command = [str(program), *options(target), f"-max_total_time={seconds}", str(corpus)]
+    limits = [*options(target, max_bytes), f"-max_total_time={seconds}"]
+    command = [str(program), *limits, str(corpus)]
     running = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(jobs)]
     executions = crashes = 0
     for job in running:
@@ -59,11 +62,11 @@ def run_long(target: str, seconds: int, jobs: int, corpus: Path) -> bool:
         if job.returncode != 0:
             crashes += 1
             print(said[-4000:], file=sys.stderr)
-    record(target, executions, seconds, crashes=crashes)
+    record(target, executions, seconds, crashes=crashes, max_bytes=max_bytes or MAX_BYTES[target])
     return crashes == 0
 
 
-def record(target: str, executions: int, seconds: int, *, crashes: int) -> None:
+def record(target: str, executions: int, seconds: int, *, crashes: int, max_bytes: int) -> None:
     """Append a run to runs.json."""
     entry = {
         "target": target,
@@ -71,6 +74,7 @@ def record(target: str, executions: int, seconds: int, *, crashes: int) -> None:
         "commit": _commit(),
         "executions": executions,
         "seconds": seconds,
+        "max_bytes": max_bytes,
         "crashes": crashes,
     }
     entries = json.loads(RUNS.read_text()) if RUNS.exists() else []
@@ -139,6 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--target", nargs="+", choices=TARGETS, default=list(TARGETS))
     parser.add_argument("--seconds", type=int, default=600, help="for each target")
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
+    parser.add_argument("--max-bytes", type=int, help="of an input: shorter ones run faster")
     parser.add_argument("--corpus", type=Path, default=BUILD / "corpus", help="what runs collect")
     parser.add_argument("--minimise", action="store_true", help="take its best into the repository")
     parser.add_argument("--coverage", action="store_true", help="only say what the corpora reach")
@@ -151,7 +156,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if chosen.minimise:
             minimise(target, chosen.corpus / target)
         else:
-            good &= run_long(target, chosen.seconds, chosen.jobs, chosen.corpus / target)
+            corpus = chosen.corpus / target
+            good &= run_long(target, chosen.seconds, chosen.jobs, corpus, chosen.max_bytes)
     return not good
 
 
