@@ -1,32 +1,24 @@
-"""Puts a robot together: board or simulator, arm, log.
-
-`connect` gives a `setae.robot.Robot`. `open` gives a `Rig`: robot and arm, and
-what is simulated of them shares one world with one clock. Nothing else in the
-package knows whether anything is simulated.
-"""
+"""Connecting, and the rig: a robot, the arm that carries it, and their log."""
 
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self, TypeAlias
 from urllib.parse import parse_qs, urlsplit
 
-import numpy as np
-from serial.tools import list_ports
-
 import setae
 from setae.config import Config, load
-from setae.errors import InputError, LogError, PortNotFoundError, StageError
-from setae.link.events import Event, FaultReported, Refused, TelemetryReceived, Tripped
+from setae.errors import InputError, LogError, StageError
 from setae.link.serial_transport import SerialTransport
 from setae.link.session import Pollable, Session
 from setae.link.transport import Transport
 from setae.record import Recorder
+from setae.rig.log import RigLog
+from setae.rig.ports import find_port
 from setae.robot import Robot
 from setae.scene import Scene, tube_scene
 from setae.sim import (
@@ -41,89 +33,11 @@ from setae.sim import (
 )
 from setae.stage import ManualStage, Stage
 from setae.ur import UrStage
-from setae_protocol.messages import (
-    PRESSURE_LSB_PER_HPA,
-    PROTOCOL_VERSION,
-    PULSE_TICKS_PER_US,
-    Guard,
-    MessageType,
-    TripCause,
-)
+from setae_protocol.messages import PROTOCOL_VERSION
 
-__all__ = ["Leave", "PortInfo", "Rig", "connect", "find_port", "open", "plants", "ports"]
+__all__ = ["Leave", "Rig", "connect", "open", "simulator_parameters", "simulator_version"]
 
 Leave: TypeAlias = Literal["relax", "hold"]
-
-# USB vendor and product of a UNO, its clones (CH340) and FTDI's adapters.
-_USB_IDS = {
-    (0x2341, 0x0043), (0x2341, 0x0001), (0x2341, 0x0243), (0x2A03, 0x0043),
-    (0x1A86, 0x7523), (0x0403, 0x6001),
-}  # fmt: skip
-
-_STAGE_PERIOD_US = 40_000
-_TRUTH_FRAMES = 2
-
-
-# ---------------------------------------------------------------------------- ports
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PortInfo:
-    """A serial port of this computer.
-
-    Attributes
-    ----------
-    device
-        Its name, such as /dev/ttyACM0.
-    description
-        What the system says of it.
-    likely
-        Whether its USB ids are those of a UNO or of a usual clone.
-    """
-
-    device: str
-    description: str
-    likely: bool
-
-
-def ports() -> list[PortInfo]:
-    """List the serial ports, by name."""
-    return sorted(
-        (
-            PortInfo(
-                device=port.device,
-                description=port.description or "",
-                likely=(port.vid, port.pid) in _USB_IDS,
-            )
-            for port in list_ports.comports()
-        ),
-        key=lambda port: port.device,
-    )
-
-
-def find_port() -> str:
-    """Find the one port with a board.
-
-    Raises
-    ------
-    PortNotFoundError
-        There is none, or more than one; the message lists the ports.
-    """
-    there = ports()
-    likely = [port.device for port in there if port.likely]
-    if len(likely) == 1:
-        return likely[0]
-    if likely:
-        raise PortNotFoundError(
-            f"{len(likely)} ports may hold the board: {', '.join(likely)}.",
-            "Choose one with --port, or connect(port).",
-        )
-    others = ", ".join(port.device for port in there) or "none at all"
-    raise PortNotFoundError(
-        f"No port has the USB ids of a UNO; ports here: {others}.",
-        "Plug the board in, name its port with --port, or use the simulator: --sim.",
-    )
-
 
 # ------------------------------------------------------------------------ connecting
 
@@ -337,7 +251,7 @@ class Rig:
         self.seed = seed
         self.plant = plant
         self.world = world
-        self._log: _Log | None = None
+        self._log: RigLog | None = None
         self._open = ExitStack()
 
     def closes(self, context: ExitStack) -> None:
@@ -397,7 +311,7 @@ class Rig:
         if self._log is not None:
             raise LogError(f"{self._log.recorder.path} is being written already.")
         about = {**self._metadata(), **(metadata or {})}
-        self._log = _Log(self, Recorder(path, metadata=about))
+        self._log = RigLog(self.robot, self.stage, self.world, Recorder(path, metadata=about))
         return self._log.recorder
 
     def _metadata(self) -> dict[str, Any]:
@@ -419,138 +333,3 @@ class Rig:
             **about,
             "scene": {**about["scene"], "arm_start_mm": list(self.stage.position_mm)},
         }
-
-
-class _Log:
-    """Writes what the link, the arm and the simulator tell into a recorder."""
-
-    def __init__(self, rig: Rig, recorder: Recorder) -> None:
-        self.recorder = recorder
-        self._rig = rig
-        self._robot = rig.robot
-        self._stage_due_us = 0
-        self._stage_moving: bool | None = None
-        self._frames = 0
-        self._robot.on_command = self._on_command
-        self._unsubscribe = self._robot.session.subscribe(self._on_event)
-
-    def close(self) -> None:
-        self._detach()
-        self.recorder.close()
-
-    def _detach(self) -> None:
-        self._unsubscribe()
-        self._robot.on_command = None
-
-    def _on_command(self, name: str, args: Mapping[str, Any]) -> None:
-        with self._told_once():
-            self.recorder.command(self._robot.now_us, name, args)
-
-    def _on_event(self, event: Event) -> None:
-        with self._told_once():
-            self._write(event)
-
-    @contextmanager
-    def _told_once(self) -> Iterator[None]:
-        """A full disk is told once. The robot still has to be stopped, and that comes by here."""
-        try:
-            yield
-        except LogError:
-            self._detach()
-            raise
-
-    def _write(self, event: Event) -> None:
-        if isinstance(event, TelemetryReceived):
-            self._telemetry(event)
-        elif isinstance(event, Tripped):
-            self._trip(event)
-        elif isinstance(event, FaultReported):
-            fault = event.record
-            self.recorder.fault(
-                event.time_us,
-                record_id=fault.record_id,
-                fault=fault.fault.name.lower(),
-                detail=fault.detail,
-                pulse_us=np.array(fault.pulse_ticks) / PULSE_TICKS_PER_US,
-            )
-        elif isinstance(event, Refused):
-            refusal = event.record
-            self.recorder.refusal(
-                event.time_us,
-                record_id=refusal.record_id,
-                command=MessageType(refusal.command_type).name.lower(),
-                reason=refusal.reason.name.lower(),
-                index=refusal.index,
-                value=refusal.value,
-                limit=refusal.limit,
-            )
-
-    def _telemetry(self, event: TelemetryReceived) -> None:
-        telemetry = event.telemetry
-        baseline_hpa = telemetry.baseline_raw / PRESSURE_LSB_PER_HPA
-        pulses_us = [
-            ticks / PULSE_TICKS_PER_US if telemetry.attached >> index & 1 else 0.0
-            for index, ticks in enumerate(telemetry.pulse_ticks)
-        ]
-        # By the board's own time: the line's delays don't belong into the log.
-        time_us = self._robot.host_time_us(telemetry.frame, telemetry.phase_us)
-        self.recorder.telemetry(
-            time_us,
-            frame=telemetry.frame,
-            state=event.state.name.lower(),
-            epoch=event.epoch,
-            pulse_us=pulses_us,
-            guard=telemetry.guard.name.lower(),
-            reflex_running=bool(telemetry.reflex_running),
-            queued=telemetry.queued,
-            baseline_hpa=baseline_hpa,
-        )
-        for sample in telemetry.samples[: telemetry.sample_count]:
-            self.recorder.pressure(
-                time_us - sample.age_us,
-                pressure_hpa=sample.pressure_raw / PRESSURE_LSB_PER_HPA,
-                baseline_hpa=baseline_hpa,
-                armed=telemetry.guard is Guard.ARMED,
-            )
-        self._stage(event.time_us)
-        self._frames += 1
-        if self._rig.world is not None and self._frames % _TRUTH_FRAMES == 0:
-            self._truth(self._rig.world)
-
-    def _trip(self, event: Tripped) -> None:
-        record = event.record
-        self.recorder.trip(
-            event.time_us,
-            record_id=record.record_id,
-            cause=record.cause.name.lower(),
-            sample_time_us=self._robot.host_time_us(record.sample_frame, record.sample_phase_us),
-            pressure_hpa=record.pressure_raw / PRESSURE_LSB_PER_HPA,
-            baseline_hpa=record.baseline_raw / PRESSURE_LSB_PER_HPA,
-            pulse_us=np.array(record.pulse_ticks) / PULSE_TICKS_PER_US,
-            contact=None if record.cause is TripCause.DEADLINE else self._robot.contact_of(event),
-        )
-
-    def _stage(self, time_us: int) -> None:
-        if time_us < self._stage_due_us:
-            return
-        self._stage_due_us = time_us + _STAGE_PERIOD_US
-        stage = self._rig.stage
-        moving = stage.moving
-        if moving or self._stage_moving is not False:
-            self.recorder.stage(time_us, position_mm=stage.position_mm, moving=moving)
-        self._stage_moving = moving
-
-    def _truth(self, world: World) -> None:
-        truth = world.truth()
-        self.recorder.truth(
-            truth.time_us,
-            backbone_mm=truth.backbone_mm,
-            filament_mm=truth.filament_mm,
-            arm_mm=truth.arm_mm,
-            contact_depth_mm=truth.contact_depth_mm,
-            contact_point_mm=np.full(3, np.nan)
-            if truth.contact_point_mm is None
-            else truth.contact_point_mm,
-            tension_n=truth.tension_n,
-            pressure_hpa=truth.pressure_hpa,
-        )
