@@ -1,4 +1,4 @@
-"""What all Python tests share: they refuse to run on an installation older than its source."""
+"""What all Python tests share; they refuse to run on an installation older than its source."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# How long an example takes is the machine's affair: a busy one failed a test of the kinematics.
+settings.register_profile("setae", deadline=None)
+settings.load_profile("setae")
 
 ROOT = Path(__file__).resolve().parents[1]
 NATIVE_FOLDERS = ("firmware/lib", "simulator")

@@ -38,10 +38,13 @@ void Board::poll() {
 }
 
 // What a sample says must reach the next frame, even one that is ready only 0.5 ms before it: so
-// near the frame's end nothing long is begun while a sample is being fetched.
+// near the frame's end nothing long is begun while a sample is being fetched. Unless bytes would be
+// lost: the next ones need room until the frame has begun.
 bool Board::sample_goes_first() {
   constexpr uint16_t kNearUs = 1000;
-  return now_.phase_us > protocol::kServoFrameUs - kNearUs && hal_.sample_on_its_way();
+  constexpr uint8_t kWaitingBytes = 72;
+  return now_.phase_us > protocol::kServoFrameUs - kNearUs && hal_.sample_on_its_way() &&
+         hal_.received().size() < kWaitingBytes;
 }
 
 void Board::start() {
