@@ -19,6 +19,7 @@ struct Snapshot {
   protocol::Guard guard;
   int32_t baseline_raw;
   bool refusal_pending;
+  protocol::Sensor sensor;
   protocol::SetLimits limits;
 };
 
@@ -35,6 +36,7 @@ struct BoardProbe {
     shot.guard = board.detector_.guard();
     shot.baseline_raw = board.detector_.baseline_raw();
     shot.refusal_pending = board.refusal_.pending();
+    shot.sensor = board.sensor_;
     shot.limits = board.limits_.in_force();
     return shot;
   }
@@ -80,9 +82,14 @@ struct Step {
            after.guard == protocol::Guard::kTaring && after.epoch == before.epoch &&
            read<protocol::GuardMessage>().epoch == before.epoch;
   }
+  // A tare failed, and the host has to read another refusal before it hears of this one.
+  bool tare_waits() const {
+    return before.guard == protocol::Guard::kTaring && before.sensor != protocol::Sensor::kOk;
+  }
   // Nothing but the delivered frame can have changed anything.
   bool quiet() const {
-    return !frame_began && !reading.fresh && reading.status == protocol::Sensor::kOk;
+    return !frame_began && !reading.fresh && reading.status == protocol::Sensor::kOk &&
+           !tare_waits();
   }
 
   template <typename Message>
