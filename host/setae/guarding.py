@@ -84,8 +84,12 @@ class Guarding:
         abort: Callable[[], object],
         *,
         timeout_s: float,
+        retract_ticks: Ticks | None = None,
     ) -> Contact | None:
-        """Hold while something else moves; after a contact the board is tripped, and holds."""
+        """Hold while something else moves; after a contact the board is tripped.
+
+        It then holds, or retracts by itself where it is told whereto.
+        """
 
         def act() -> None:
             try:
@@ -105,8 +109,8 @@ class Guarding:
         return self._guarded(
             act,
             limit_s=timeout_s + 2 * REPLY_S,
-            reflex=Reflex.HOLD,
-            retract_ticks=self._board.telemetry.pulse_ticks,
+            reflex=Reflex.HOLD if retract_ticks is None else Reflex.RETRACT,
+            retract_ticks=retract_ticks or self._board.telemetry.pulse_ticks,
         )
 
     def contact_of(self, trip: Tripped) -> Contact:

@@ -273,6 +273,7 @@ class Robot(Controls):
         abort: Callable[[], object],
         *,
         timeout_s: float,
+        retract_mm: npt.ArrayLike | None = None,
     ) -> Contact | None:
         """Hold still with the bristle watching, while something else moves.
 
@@ -287,17 +288,23 @@ class Robot(Controls):
             about a contact, or about whatever else went wrong.
         timeout_s
             For the other motion.
+        retract_mm
+            Where the board retracts to after a contact, (3,); None: nowhere.
 
         Returns
         -------
         Contact or None
-            After a contact the robot holds; the other motion was aborted, and may
-            still be braking.
+            After a contact the robot holds, where it retracted to; the other motion was
+            aborted, and may still be braking.
         """
         self._board.require_holding()
-        self._told("hold_guarded", timeout_s=timeout_s)
-
-        return self._hold_again(self._guarding.watch(begin, busy, abort, timeout_s=timeout_s))
+        retract = None
+        if retract_mm is not None:
+            retract = self._planner.ticks(self._planner.reach(retract_mm, None))
+        self._told("hold_guarded", timeout_s=timeout_s,
+                   retract_mm=None if retract_mm is None else _list(retract_mm))  # fmt: skip
+        found = self._guarding.watch(begin, busy, abort, timeout_s=timeout_s, retract_ticks=retract)
+        return self._hold_again(found)
 
     def contact_of(self, trip: Tripped) -> Contact:
         """What a trip's record tells about the contact."""

@@ -8,12 +8,14 @@ the stage together with the robot, so each is watched while the other moves.
 from __future__ import annotations
 
 import contextlib
+import math
 import select
 import sys
 import termios
 from collections.abc import Callable, Sequence
 from typing import IO, Protocol, runtime_checkable
 
+from setae.config import Stage as Bounds
 from setae.errors import StageError
 
 
@@ -61,6 +63,26 @@ class Stage(Protocol):
     def poll(self, now_us: int) -> None:
         """Look at the stage at this time. Raises StageError once it has failed."""
         ...
+
+
+# Beyond the time that speed and acceleration ask for, before a move counts as failed.
+_SLACK_S = 5.0
+
+
+def move_timeout_s(
+    bounds: Bounds, position_mm: Sequence[float], target_mm: Sequence[float]
+) -> float:
+    """Longest time for a move from a position to a target, (3,) each.
+
+    Parameters
+    ----------
+    bounds
+        Speed and acceleration of the move.
+    """
+    distance_mm = math.dist(position_mm, target_mm)
+    return (
+        distance_mm / bounds.speed_mm_s + bounds.speed_mm_s / bounds.acceleration_mm_s2 + _SLACK_S
+    )
 
 
 class Enter:

@@ -69,7 +69,7 @@ MISTAKES = [
         (
             "my.toml: 'tendon_radius_mm' stands outside of any section. Put it below one of: "
             "[geometry], [spring], [servo], [motion], [bristle], [stage], [ur], [explore], [tube], "
-            "[simulator]."
+            "[scan], [simulator]."
         ),
     ),
     (

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from setae.config.experiments import Explore, Scan, Tube
 from setae.config.geometry import Geometry
 from setae.config.reading import load, loads
 from setae.config.sections import (
@@ -13,12 +14,10 @@ from setae.config.sections import (
     TENDON_MODELS,
     Bristle,
     Config,
-    Explore,
     Motion,
     Servo,
     Spring,
     Stage,
-    Tube,
     Ur,
 )
 
@@ -30,6 +29,7 @@ __all__ = [
     "Explore",
     "Geometry",
     "Motion",
+    "Scan",
     "Servo",
     "Spring",
     "Stage",

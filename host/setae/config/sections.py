@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+from setae.config.experiments import Explore, Scan, Tube
 from setae.config.geometry import Geometry
 from setae.config.keys import Section, key, toml_lines
 from setae.errors import ConfigError
@@ -222,56 +223,6 @@ class Ur(Section):
         return ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Explore(Section):
-    """The exploration of a tube, section III-D of the paper.
-
-    Attributes
-    ----------
-    step_mm, steps
-        The arm's steps downwards.
-    compressed_length_mm
-        Length between two directions.
-    target_radius_mm, target_height_mm
-        Targets (radius·cos α, radius·sin α, height) in frame D.
-    directions
-        Number of directions α.
-    extend_duration_s, retract_duration_s
-        Of the two motions of a direction.
-    """
-
-    step_mm: float = key(low=0.1, high=1000)
-    steps: int = key(low=1, high=1000, integer=True)
-    compressed_length_mm: float = key(low=0.1, high=5000)
-    target_radius_mm: float = key(low=0, high=5000)
-    target_height_mm: float = key(low=0.1, high=5000)
-    directions: int = key(low=1, high=360, integer=True)
-    extend_duration_s: float = key(low=0.02, high=600)
-    retract_duration_s: float = key(low=0.02, high=600)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tube(Section):
-    """The scene of the exploration.
-
-    Attributes
-    ----------
-    inner_radius_mm
-        Of the tube.
-    axis_offset_mm
-        Distance of the tube's axis from the robot's, opposite the obstacle.
-    cube_edge_mm
-        Edge of the cube that is the obstacle.
-    obstacle_below_tip_mm
-        Depths of the cube's top below the compressed bristle's tip, one a trial.
-    """
-
-    inner_radius_mm: float = key(low=1, high=10000)
-    axis_offset_mm: float = key(low=0, high=10000)
-    cube_edge_mm: float = key(low=0.1, high=10000)
-    obstacle_below_tip_mm: tuple[float, ...] = key(low=-1000, high=10000, count=(1, 100))
-
-
 SECTIONS: dict[str, type[Section]] = {
     "geometry": Geometry,
     "spring": Spring,
@@ -282,6 +233,7 @@ SECTIONS: dict[str, type[Section]] = {
     "ur": Ur,
     "explore": Explore,
     "tube": Tube,
+    "scan": Scan,
 }
 
 
@@ -291,7 +243,7 @@ class Config:
 
     Attributes
     ----------
-    geometry, spring, servo, motion, bristle, stage, ur, explore, tube
+    geometry, spring, servo, motion, bristle, stage, ur, explore, tube, scan
         The sections.
     simulator
         Parameters of the simulator, (its own name, value), sorted by name; they stand
@@ -315,6 +267,7 @@ class Config:
     ur: Ur
     explore: Explore
     tube: Tube
+    scan: Scan
     simulator: tuple[tuple[str, float], ...] = ()
     plant: str = DEFAULT_PLANT
 
@@ -334,16 +287,31 @@ class Config:
                 f"{most_n:.3g} N that a servo holds.",
                 "That is stall_torque_n_m times torque_part over pulley_radius_mm.",
             )
-        length, low, high = (
-            self.explore.compressed_length_mm,
-            self.geometry.min_length_mm,
-            self.geometry.free_length_mm,
-        )
-        if not low <= length <= high:
+        low, high = self.geometry.min_length_mm, self.geometry.free_length_mm
+        retracted, extended = self.scan_lengths_mm
+        for name, length in (
+            ("[explore] compressed_length_mm", self.explore.compressed_length_mm),
+            ("[scan] retracted_length_mm", retracted),
+            ("[scan] extended_length_mm", extended),
+        ):
+            if not low <= length <= high:
+                raise ConfigError(
+                    f"{name} = {length:g} must lie from "
+                    f"min_length_mm = {low:g} to free_length_mm = {high:g}."
+                )
+        if retracted >= extended:
             raise ConfigError(
-                f"[explore] compressed_length_mm = {length:g} must lie from "
-                f"min_length_mm = {low:g} to free_length_mm = {high:g}."
+                f"[scan] retracted_length_mm = {retracted:g} must be below "
+                f"extended_length_mm = {extended:g}."
             )
+
+    @property
+    def scan_lengths_mm(self) -> tuple[float, float]:
+        """Lengths of the spring between which a scan goes to and fro: short, long."""
+        return (
+            self.scan.retracted_length_mm or self.geometry.min_length_mm,
+            self.scan.extended_length_mm or self.geometry.free_length_mm,
+        )
 
     def to_toml(self) -> str:
         """The whole configuration as TOML, for logs: `loads` reads it back."""

@@ -27,16 +27,12 @@ from setae.config import Config
 from setae.errors import SetaeError
 from setae.robot import Contact, Robot
 from setae.scene import Obstacle
-from setae.stage import Stage
+from setae.stage import Stage, move_timeout_s
 
 Point = tuple[float, float, float]
 
 PAPER_DESCENTS_MM = (40.0, 60.0, 80.0, 100.0, 100.0)
 """How far the paper's arm went down: obstacles at 35, 55, 75, 95 mm, then none."""
-
-# Beyond the time that speed and acceleration ask for, before a move of the arm
-# counts as failed.
-_ARM_SLACK_S = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -418,13 +414,7 @@ class _Trial:
     def _arm_timeout_s(self, target_mm: Sequence[float]) -> float:
         if self._fixed_arm_timeout_s is not None:
             return self._fixed_arm_timeout_s
-        settings = self._robot.config.stage
-        distance_mm = math.dist(self._stage.position_mm, target_mm)
-        return (
-            distance_mm / settings.speed_mm_s
-            + settings.speed_mm_s / settings.acceleration_mm_s2
-            + _ARM_SLACK_S
-        )
+        return move_timeout_s(self._robot.config.stage, self._stage.position_mm, target_mm)
 
     def _descent_mm(self) -> float:
         return round(self._start_mm[2] - self._stage.position_mm[2], 3)
