@@ -29,6 +29,7 @@ to do about it; both parts are also attributes::
     │   ├── ArmFrozenError
     │   ├── ArmStoppedError
     │   └── ArmBoxError
+    ├── HeightWindowError
     ├── SimulatorMissingError
     ├── LogError
     └── ExtraMissingError
@@ -52,6 +53,7 @@ __all__ = [
     "DeadlineError",
     "ExtraMissingError",
     "FaultError",
+    "HeightWindowError",
     "InputError",
     "LinkError",
     "LinkLostError",
@@ -406,6 +408,14 @@ class ArmBoxError(StageError):
     """
 
     default_remedy = "Start elsewhere, or change box_min_mm and box_max_mm in [ur]."
+
+
+class HeightWindowError(SetaeError):
+    """What is scanned does not fit between the retracted and the extended bristle.
+
+    Examples of when it happens: the object is taller than `tallest_mm` says, or the arm's start
+    is too low.
+    """
 
 
 class SimulatorMissingError(SetaeError):

@@ -1,0 +1,55 @@
+"""The paper's scan of a surface.
+
+The arm carries the robot over a square, from place to place, and the bristle feels from above
+how high the surface is there. Three ways of going about it, see `MODES`:
+
+paper
+    Extended steps until something is touched; then retract, extend to the contact that is the
+    measurement, retract, step, extend, until a full extension feels nothing.
+safe
+    Retracted in every step.
+adaptive
+    Beyond the paper: sweeps over the empty, retracts only as far as is safe, visits what can't
+    be inferred.
+
+The world begins at frame D's origin above the first place; x and y go along the square's sides,
+z up. Robot and arm may be real or simulated; nothing here can tell.
+"""
+
+from __future__ import annotations
+
+from setae.experiments.scan.reading import read, read_logs, settings_of
+from setae.experiments.scan.run import (
+    MODES,
+    Mode,
+    ScanResult,
+    arm_targets_mm,
+    in_scene,
+    record_true_surface,
+    recorded,
+    scan,
+    simulate,
+    true_surface,
+)
+from setae.experiments.scan.steps import require_window, window_mm
+from setae.experiments.scan.survey import Place, Survey
+
+__all__ = [
+    "MODES",
+    "Mode",
+    "Place",
+    "ScanResult",
+    "Survey",
+    "arm_targets_mm",
+    "in_scene",
+    "read",
+    "read_logs",
+    "record_true_surface",
+    "recorded",
+    "require_window",
+    "scan",
+    "settings_of",
+    "simulate",
+    "true_surface",
+    "window_mm",
+]

@@ -1,0 +1,279 @@
+"""What every scan is made of: guarded steps of the arm, extensions, retractions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from setae import kinematics, workspace
+from setae.config import Config
+from setae.contact import Contact
+from setae.errors import HeightWindowError
+from setae.experiments.explore import Event, OnEvent
+from setae.link.events import Event as LinkEvent
+from setae.link.events import TelemetryReceived
+from setae.robot import Robot
+from setae.stage import Stage, move_timeout_s
+from setae_protocol.messages import PRESSURE_LSB_PER_HPA, Guard
+
+# A contact so soon after an extension's start was there before it.
+_AT_ONCE_MM = 1.5
+# Shorter moves of the arm are none.
+_HERE_MM = 0.02
+# Shorter differences of length are not worth a move of the spring.
+_SAME_LENGTH_MM = 0.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Feeling:
+    """What an extension felt.
+
+    Attributes
+    ----------
+    mark
+        ``felt``, ``slipped``, ``double``, ``lost`` or ``empty``, see `setae.heightmap.MARKS`.
+    height_mm
+        Of the surface in the world; NaN without a contact.
+    contact
+        What the board's record tells, or None.
+    """
+
+    mark: str
+    height_mm: float
+    contact: Contact | None
+
+
+def window_mm(config: Config) -> float:
+    """How far above the extended bristle's tip something may rise, to be stepped over.
+
+    Examples
+    --------
+    >>> from setae.config import load
+    >>> window_mm(load())
+    45.0
+    """
+    short_mm, long_mm = config.scan_lengths_mm
+    return long_mm - short_mm - config.scan.clearance_mm
+
+
+def require_window(config: Config, tallest_mm: float) -> None:
+    """Refuse a scan whose retracted bristle would not clear what is there.
+
+    Parameters
+    ----------
+    tallest_mm
+        Of what is scanned, above the extended bristle's tip.
+
+    Raises
+    ------
+    HeightWindowError
+        It is too tall.
+    UnreachableError
+        The robot can't take a length of the scan.
+    """
+    for length_mm in config.scan_lengths_mm:
+        workspace.require(kinematics.inverse((0.0, 0.0, length_mm)), config)
+    too_much_mm = tallest_mm - window_mm(config)
+    if too_much_mm > 1e-6:
+        raise HeightWindowError(
+            f"What is scanned rises {tallest_mm:g} mm above the extended bristle's tip; the "
+            f"retracted one clears {window_mm(config):g} mm with {config.scan.clearance_mm:g} mm "
+            "to spare.",
+            f"Raise the arm's start by {too_much_mm:.3g} mm, or give a smaller clearance_mm in "
+            "[scan].",
+        )
+
+
+class Steps:
+    """Arm and robot, moved with the bristle watching.
+
+    Parameters
+    ----------
+    robot, stage
+        Enabled robot, and the arm at the first place.
+    config
+        The robot's, with the settings of this scan.
+    on_event
+        Called with each `Event`.
+    arm_timeout_s
+        Longest time for a move of the arm; None: what its configured speed asks for.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        stage: Stage,
+        config: Config,
+        *,
+        on_event: OnEvent | None = None,
+        arm_timeout_s: float | None = None,
+    ) -> None:
+        self._robot = robot
+        self._stage = stage
+        self._settings = config.scan
+        self._on_event = on_event
+        self._fixed_arm_timeout_s = arm_timeout_s
+        self._origin_mm = stage.position_mm
+        self.short_mm, self.long_mm = config.scan_lengths_mm
+        self._watch = _PressureWatch()
+        self._unsubscribe = robot.session.subscribe(self._watch.take)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._unsubscribe()
+
+    # ---------------------------------------------------------------------------- facts
+
+    @property
+    def now_us(self) -> int:
+        """The session's clock."""
+        return self._robot.now_us
+
+    @property
+    def position_mm(self) -> tuple[float, float, float]:
+        """Of frame D's origin, from the first place."""
+        now, origin = self._stage.position_mm, self._origin_mm
+        return (now[0] - origin[0], now[1] - origin[1], now[2] - origin[2])
+
+    @property
+    def length_mm(self) -> float:
+        """Commanded length of the spring."""
+        return float(self._robot.pose.length_mm)
+
+    @property
+    def extended(self) -> bool:
+        """Whether the spring has its full length."""
+        return self.length_mm > self.long_mm - _SAME_LENGTH_MM
+
+    def length_over_mm(self, height_mm: float) -> float:
+        """Longest spring whose tip clears a height of the world, within what the scan may take."""
+        offset_mm = self._robot.config.geometry.tip_offset_mm + self._settings.clearance_mm
+        length_mm = self.position_mm[2] - height_mm - offset_mm
+        return min(max(length_mm, self.short_mm), self.long_mm)
+
+    # ---------------------------------------------------------------------------- moves
+
+    def retract(self, length_mm: float | None = None) -> None:
+        """Shorten the spring; to its least length of the scan, unless told otherwise."""
+        target_mm = self.short_mm if length_mm is None else length_mm
+        way_mm = self.length_mm - target_mm
+        if way_mm > _SAME_LENGTH_MM:
+            duration_s = self._duration_s(way_mm, self._settings.retract_duration_s)
+            self._robot.compress(target_mm, duration_s=duration_s)
+
+    def go(self, x_mm: float, y_mm: float) -> Contact | None:
+        """Take the arm to a place with the bristle watching.
+
+        On a contact the board makes the robot short by itself, and the arm stops where it is.
+
+        Raises
+        ------
+        HeightWindowError
+            The robot is short already: what it touched is too high to be stepped over.
+        """
+        now_mm, origin_mm = self.position_mm, self._origin_mm
+        if math.dist(now_mm[:2], (x_mm, y_mm)) < _HERE_MM:
+            return None
+        target_mm = (origin_mm[0] + x_mm, origin_mm[1] + y_mm, origin_mm[2])
+        short = self.length_mm - self.short_mm < _SAME_LENGTH_MM
+        self.emit("step", target_mm=[x_mm, y_mm], length_mm=round(self.length_mm, 3))
+        contact = self._robot.hold_guarded(
+            begin=lambda: self._stage.move_to(target_mm),
+            busy=lambda: self._stage.moving,
+            abort=self._stage.stop,
+            timeout_s=self._arm_timeout_s(target_mm),
+            retract_mm=None if short else (0.0, 0.0, self.short_mm),
+        )
+        if contact is None:
+            return None
+        self._robot.wait(
+            lambda: not self._stage.moving,
+            timeout_s=self._arm_timeout_s(target_mm),
+            what="the arm to come to rest",
+        )
+        place_mm = self.position_mm
+        self.emit(
+            "step_contact",
+            position_mm=list(place_mm),
+            contact={
+                "time_us": contact.time_us,
+                "pressure_hpa": contact.pressure_hpa,
+                "baseline_hpa": contact.baseline_hpa,
+            },
+        )
+        if short:
+            raise HeightWindowError(
+                f"The retracted bristle touched something {place_mm[0]:.0f}, {place_mm[1]:.0f} mm "
+                "from the first place: it can't be stepped over.",
+                "Raise the arm's start, and scan anew.",
+            )
+        return contact
+
+    def feel(self) -> Feeling:
+        """Extend to the full length or the first contact.
+
+        After a contact the robot is as long as before, otherwise extended.
+        """
+        begin_mm = self.length_mm
+        duration_s = self._duration_s(self.long_mm - begin_mm, self._settings.extend_duration_s)
+        self._watch.begin()
+        contact = self._robot.probe((0.0, 0.0, self.long_mm), duration_s=duration_s)
+        slipped = self._watch.fell_hpa() > self._settings.slip_hpa
+        if contact is None:
+            return Feeling(mark="lost" if slipped else "empty", height_mm=math.nan, contact=None)
+        tip_mm = contact.tip_mm[2] - self._settings.contact_depth_mm
+        mark = "felt"
+        if contact.position_mm[2] - begin_mm < _AT_ONCE_MM:
+            mark = "double"
+        elif slipped:
+            mark = "slipped"
+        return Feeling(mark=mark, height_mm=self.position_mm[2] - tip_mm, contact=contact)
+
+    def stop(self, error: BaseException) -> None:
+        """Stop arm and robot. Their own failures must not hide what went wrong first."""
+        for stop in (self._stage.stop, self._robot.stop):
+            try:
+                stop()
+            except Exception as failure:
+                error.add_note(f"Stopping failed too: {failure}")
+
+    def emit(self, name: str, **data: Any) -> None:
+        """Tell of something that happened."""
+        if self._on_event is not None:
+            self._on_event(Event(time_us=self.now_us, name=name, data=data))
+
+    def _duration_s(self, way_mm: float, whole_s: float) -> float:
+        return max(0.1, whole_s * way_mm / (self.long_mm - self.short_mm))
+
+    def _arm_timeout_s(self, target_mm: tuple[float, float, float]) -> float:
+        if self._fixed_arm_timeout_s is not None:
+            return self._fixed_arm_timeout_s
+        return move_timeout_s(self._robot.config.stage, self._stage.position_mm, target_mm)
+
+
+class _PressureWatch:
+    """Notices pressure that rose and fell back while the board watched: a bristle that slid off."""
+
+    def __init__(self) -> None:
+        self._highest_hpa = 0.0
+        self._fell_hpa = 0.0
+
+    def begin(self) -> None:
+        self._highest_hpa = self._fell_hpa = 0.0
+
+    def fell_hpa(self) -> float:
+        """Largest fall of the pressure's change since `begin`."""
+        return self._fell_hpa
+
+    def take(self, event: LinkEvent) -> None:
+        if not isinstance(event, TelemetryReceived):
+            return
+        telemetry = event.telemetry
+        if telemetry.guard is not Guard.ARMED:
+            return
+        # The newest comes last.
+        for sample in telemetry.samples[: telemetry.sample_count]:
+            change_hpa = abs(sample.pressure_raw - telemetry.baseline_raw) / PRESSURE_LSB_PER_HPA
+            self._highest_hpa = max(self._highest_hpa, change_hpa)
+            self._fell_hpa = max(self._fell_hpa, self._highest_hpa - change_hpa)
