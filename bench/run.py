@@ -38,7 +38,8 @@ from tests.system import oracle  # noqa: E402
 
 from setae import rig  # noqa: E402
 from setae.config import load  # noqa: E402
-from setae.experiments.explore import Event, explore  # noqa: E402
+from setae.experiments.events import Event  # noqa: E402
+from setae.experiments.explore import explore  # noqa: E402
 from setae.link.events import Event as LinkEvent  # noqa: E402
 from setae.link.events import Tripped  # noqa: E402
 from setae.scene import Obstacle, tube_scene  # noqa: E402

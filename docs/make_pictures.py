@@ -20,8 +20,9 @@ import theory_pictures
 
 from setae import record, tendons
 from setae.experiments import causes, runs
-from setae.report import bristle, explore, pictures, validation_pictures
+from setae.report import animation, bristle, explore, pictures, validation_pictures
 from setae.report import causes as why
+from setae.report.trial import telling
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 
@@ -30,7 +31,7 @@ def draw(run: Path) -> None:
     """Draw a run's pictures into docs/pictures."""
     trials = explore.trials(run)
     pictures.write_all(PICTURES, trials)
-    pictures.animation(PICTURES / "explore.gif", pictures.telling(trials))
+    animation.write(PICTURES / "explore.gif", telling(trials))
 
 
 def draw_validation(run: Path) -> None:

@@ -22,8 +22,8 @@ from setae import report
 from setae.config import load
 from setae.errors import ExtraMissingError, LogError
 from setae.record import Recorder, read
-from setae.report import explore, html, pictures
-from setae.report.trial import load as load_trial
+from setae.report import animation, explore, html
+from setae.report.reading import load as load_trial
 from setae.servo import ServoModel
 
 ALPHAS_DEG = tuple(range(0, 360, 45))
@@ -519,7 +519,7 @@ def test_importing_the_report_imports_no_plotting(tmp_path: Path) -> None:
 def test_an_animation_is_drawn(tmp_path: Path) -> None:
     trial = load_trial(read(write_log(tmp_path / "log.mcap", 1, 35.0, levels=2)))
     path = tmp_path / "explore.gif"
-    pictures.animation(path, trial, frames=8, width_px=160)
+    animation.write(path, trial, frames=8, width_px=160)
     data = path.read_bytes()
     assert data.startswith(b"GIF89a")
     assert data.count(b"\x21\xf9\x04") >= 6  # graphic control blocks: one a frame

@@ -9,7 +9,8 @@ from tests.system.robots import WALL_AHEAD, bench, compressed
 
 from setae.config import loads
 from setae.errors import BoardResetError, FaultError, StoppedError
-from setae.experiments.explore import Event, explore
+from setae.experiments.events import Event
+from setae.experiments.explore import explore
 from setae.link.lossy import Faults
 from setae.scene import Obstacle
 from setae_protocol.messages import State

@@ -20,15 +20,9 @@ from tests.system.robots import run_world
 from setae import record, rig
 from setae.config import load
 from setae.errors import LogError
-from setae.experiments.explore import (
-    PAPER_DESCENTS_MM,
-    Event,
-    ExploreResult,
-    OnEvent,
-    explore,
-    paper_obstacles,
-    run_trials,
-)
+from setae.experiments.descent import PAPER_DESCENTS_MM, paper_obstacles
+from setae.experiments.events import Event, OnEvent
+from setae.experiments.explore import ExploreResult, explore, run_trials
 from setae.scene import Obstacle, Scene, tube_scene
 from setae.solids import Box
 from setae_protocol.messages import State

@@ -16,7 +16,7 @@ from setae.cli import main
 from setae.cli.common import interrupts
 from setae.config import load
 from setae.experiments import causes, runs
-from setae.experiments.explore import Event
+from setae.experiments.events import Event
 from setae.experiments.targets import choose, paper_targets
 from setae.experiments.validate import Noise, validate
 from setae.link.session import Session

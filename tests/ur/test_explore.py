@@ -11,7 +11,8 @@ from tests.ur.controller import FakeController, patient
 from setae import rig
 from setae.config import Config, load
 from setae.errors import ArmFrozenError, StoppedError
-from setae.experiments.explore import Event, explore
+from setae.experiments.events import Event
+from setae.experiments.explore import explore
 from setae.scene import Obstacle, tube_scene
 from setae_protocol.messages import State
 

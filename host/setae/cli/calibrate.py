@@ -14,7 +14,7 @@ from setae.cli.runs import later, say, what_is_left, write_report
 from setae.config import Config
 from setae.errors import InputError, SetaeError
 from setae.experiments import bristle as study
-from setae.experiments.explore import Event
+from setae.experiments.events import Event
 from setae.record import Recorder
 from setae.scene import open_scene
 from setae.stage import Enter

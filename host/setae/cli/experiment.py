@@ -18,17 +18,15 @@ from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.cli.runs import STOPPED, later, say, what_is_left, write_report
 from setae.config import Config
 from setae.errors import InputError, SetaeError
-from setae.experiments.explore import (
+from setae.experiments.descent import (
     PAPER_DESCENTS_MM,
-    Event,
-    ExploreResult,
-    OnEvent,
     arm_targets_mm,
     paper_obstacles,
     reach_below_tip_mm,
-    run_trials,
     targets_mm,
 )
+from setae.experiments.events import Event, OnEvent
+from setae.experiments.explore import ExploreResult, run_trials
 from setae.robot import Robot
 from setae.scene import Obstacle, tube_scene
 from setae.stage import Enter, ManualStage

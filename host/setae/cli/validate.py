@@ -20,7 +20,7 @@ from setae.errors import InputError, SetaeError
 from setae.experiments import causes as why
 from setae.experiments import positions as measurements
 from setae.experiments import runs, view
-from setae.experiments.explore import Event
+from setae.experiments.events import Event
 from setae.experiments.targets import Target, choose, paper_targets
 from setae.experiments.validate import Noise, measured, validate
 from setae.robot import Robot

@@ -19,7 +19,7 @@ import numpy as np
 from setae.arc import Arc, FloatArray
 from setae.config import Config
 from setae.errors import InputError, SetaeError, TrippedError
-from setae.experiments.explore import Event, OnEvent
+from setae.experiments.events import Event, OnEvent
 from setae.link.events import Event as LinkEvent
 from setae.link.events import TelemetryReceived
 from setae.record import Log

@@ -22,7 +22,7 @@ from setae.arc import FloatArray
 from setae.config import Config
 from setae.errors import InputError, SetaeError
 from setae.experiments.accuracy import Pose
-from setae.experiments.explore import Event, OnEvent
+from setae.experiments.events import Event, OnEvent
 from setae.experiments.targets import Target, commanded_lengths_mm
 from setae.record import Recorder
 from setae.robot import Robot

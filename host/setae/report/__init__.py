@@ -2,9 +2,10 @@
 
 `write` is the way in. `explore`, `validation` and `bristle` are the reports of the
 experiments, each with its page, pictures and tables; `paper` holds the paper's
-numbers. Of the exploration, `trial` reads a log, and `shapes` and `drawing` draw
-the robot. Matplotlib and Plotly come with the extra ``report`` and are imported
-when first needed.
+numbers. Of the exploration, `reading` finds a `trial` in a log, `shapes` and
+`drawing` draw the robot, and `scene`, `felt` and `depths` draw its pictures.
+Matplotlib and Plotly come with the extra ``report`` and are imported when first
+needed.
 """
 
 from __future__ import annotations

@@ -8,7 +8,8 @@ from pathlib import Path
 from setae.record import Log, read
 from setae.report import files, html, pictures, tables
 from setae.report.files import Report
-from setae.report.trial import Trial, load
+from setae.report.reading import load
+from setae.report.trial import Trial
 
 
 def trials(logs: str | Path | Iterable[str | Path | Log]) -> tuple[Trial, ...]:

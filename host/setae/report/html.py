@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from setae.report import drawing, extras, imperfections, palette, paper, shapes, template
-from setae.report.pictures import floor_mm, origin_note
+from setae.report.scene import floor_mm
 from setae.report.tables import Comparison, compare
-from setae.report.trial import Trial
+from setae.report.trial import Trial, origin_note
 
 FRAMES_PER_S = 8.0  # the page draws straight lines in between
 POINT_STEP_MM = 0.05  # 16 bits then reach 1.6 m

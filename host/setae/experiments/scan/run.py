@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from setae import rig
 from setae.config import Config, Scan
 from setae.errors import InputError, SetaeError
-from setae.experiments.explore import OnEvent
+from setae.experiments.events import OnEvent
 from setae.experiments.scan import adaptive, cycles
 from setae.experiments.scan.steps import Feeling, Steps, require_window
 from setae.experiments.scan.survey import Cell, Place, Survey

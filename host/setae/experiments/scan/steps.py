@@ -10,7 +10,7 @@ from setae import kinematics, workspace
 from setae.config import Config
 from setae.contact import Contact
 from setae.errors import HeightWindowError
-from setae.experiments.explore import Event, OnEvent
+from setae.experiments.events import Event, OnEvent
 from setae.link.events import Event as LinkEvent
 from setae.link.events import TelemetryReceived
 from setae.robot import Robot
