@@ -59,16 +59,16 @@ FORCE:
 
 .venv/.installed: .venv/.made .venv/.modules pyproject.toml $(NATIVE_SOURCES)
 	@echo 'setae: compiling the simulator'
-	@$(PIP) --no-build-isolation --editable '.[report]'
+	@$(PIP) --no-build-isolation --editable '.[report,perception,study]'
 	@touch $@
 
 .venv/.dev: pyproject.toml constraints.txt | .venv/.installed
 	@echo 'setae: installing the tools for tests and checks into .venv'
-	@$(PIP) --no-build-isolation --editable '.[report,dev]'
+	@$(PIP) --no-build-isolation --editable '.[report,perception,study,dev]'
 	@touch $@
 
 .venv/.docs: pyproject.toml constraints.txt | .venv/.installed
-	@$(PIP) --no-build-isolation --editable '.[report,docs]'
+	@$(PIP) --no-build-isolation --editable '.[report,perception,study,docs]'
 	@touch $@
 
 .PHONY: build
@@ -159,7 +159,7 @@ pytest: .venv/.dev firmware $(AVR_LIBRARY) ## the Python tests
 fuzz: .venv/.dev ## fuzz firmware and host, FUZZ_SECONDS each target; noted in tests/fuzz/runs.json
 	@.ci/need $(FUZZ_PACKAGES)
 	$(BIN)/python tests/fuzz/fuzz.py --seconds $(FUZZ_SECONDS) --jobs $(FUZZ_JOBS)
-	@$(PIP) --no-build-isolation --editable '.[report,dev,fuzz]'
+	@$(PIP) --no-build-isolation --editable '.[report,perception,study,dev,fuzz]'
 	for target in engine config log; do \
 	  $(BIN)/python tests/fuzz/atheris_host.py $$target -max_total_time=$(FUZZ_SECONDS) || exit 1; done
 

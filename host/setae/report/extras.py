@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 from types import ModuleType
 
-from setae.errors import ExtraMissingError
+from setae import extras
 
 
 def load(module: str) -> ModuleType:
@@ -16,7 +15,4 @@ def load(module: str) -> ModuleType:
     ExtraMissingError
         It isn't installed.
     """
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise ExtraMissingError("report", "A report") from error
+    return extras.load(module, "report", "A report")

@@ -1,0 +1,137 @@
+"""How near a scan is to the true surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from setae import extras
+from setae.arc import FloatArray
+from setae.heightmap import TOUCHED, HeightMap
+from setae.perception.surface import height_mm
+from setae.solids import Solid
+
+__all__ = ["EDGE_MM", "Nearness", "away_from_edges", "nearness"]
+
+EDGE_MM = 6.0
+"""So near to a step the bristle may bend past it, or touch it from the side."""
+
+STEP_MM = 5.0
+"""Such a difference of height within `EDGE_MM` is a step, or a slope as steep as one."""
+
+_DENSE_MM = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nearness:
+    """A scan against the true surface.
+
+    Attributes
+    ----------
+    height_rms_mm
+        Root mean square of measured less true height, over touched places away from edges; NaN
+        where there is none.
+    height_bias_mm
+        Mean of the same differences.
+    places
+        How many those are.
+    chamfer_mm
+        Mean of the next two.
+    to_surface_mm
+        Mean distance in space of the touched points from the true upper surface.
+    from_surface_mm
+        Mean distance of the true surface, at the places of the scan, from the touched points.
+    """
+
+    height_rms_mm: float
+    height_bias_mm: float
+    places: int
+    chamfer_mm: float
+    to_surface_mm: float
+    from_surface_mm: float
+
+
+def away_from_edges(
+    solids: Sequence[Solid], x_mm: FloatArray, y_mm: FloatArray
+) -> NDArray[np.bool_]:
+    """Say which places have no step of the surface within `EDGE_MM`.
+
+    Parameters
+    ----------
+    solids
+        Table and object.
+    x_mm, y_mm
+        Places, of one shape.
+    """
+    turn = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
+    around = [
+        height_mm(solids, x_mm + part * EDGE_MM * np.cos(a), y_mm + part * EDGE_MM * np.sin(a))
+        for a in turn
+        for part in (0.5, 1.0)
+    ]
+    heights = np.stack([height_mm(solids, x_mm, y_mm), *around])
+    return np.asarray(heights.max(axis=0) - heights.min(axis=0) < STEP_MM)
+
+
+def nearness(heights: HeightMap, solids: Sequence[Solid], *, reach_mm: float) -> Nearness:
+    """Hold a scan against the true surface.
+
+    Parameters
+    ----------
+    heights
+        The scan.
+    solids
+        Table and object, in the world.
+    reach_mm
+        z of the world that the fully extended tip reaches: what lies deeper can't be felt, and
+        doesn't count.
+
+    Raises
+    ------
+    ExtraMissingError
+        SciPy isn't installed.
+    """
+    tree = extras.load("scipy.spatial", "perception", "Measuring distances").cKDTree
+    x, y = np.meshgrid(heights.x_mm, heights.y_mm)
+    true = height_mm(solids, x, y)
+    felt = np.isin(heights.mark, TOUCHED) & np.isfinite(heights.height_mm)
+    judged = felt & away_from_edges(solids, x, y) & (true >= reach_mm)
+    error = heights.height_mm[judged] - true[judged]
+    points = heights.points_mm()
+    there = true >= reach_mm
+    at_places = np.stack([x[there], y[there], true[there]], axis=1)
+    dense = _dense_mm(heights, solids, reach_mm)
+    none = float("nan")
+    to_surface = float(tree(dense).query(points)[0].mean()) if len(points) and len(dense) else none
+    both = len(points) > 0 and len(at_places) > 0
+    from_surface = float(tree(points).query(at_places)[0].mean()) if both else none
+    return Nearness(
+        height_rms_mm=float(np.sqrt((error**2).mean())) if len(error) else none,
+        height_bias_mm=float(error.mean()) if len(error) else none,
+        places=len(error),
+        chamfer_mm=(to_surface + from_surface) / 2,
+        to_surface_mm=to_surface,
+        from_surface_mm=from_surface,
+    )
+
+
+def _dense_mm(heights: HeightMap, solids: Sequence[Solid], reach_mm: float) -> FloatArray:
+    """Points of the true surface, a millimetre apart; a wall is filled from top to foot."""
+    x, y = np.meshgrid(
+        np.arange(heights.x_mm[0], heights.x_mm[-1] + _DENSE_MM / 2, _DENSE_MM),
+        np.arange(heights.y_mm[0], heights.y_mm[-1] + _DENSE_MM / 2, _DENSE_MM),
+    )
+    z = height_mm(solids, x, y)
+    low = z.copy()
+    for axis in (0, 1):
+        for shift in (-1, 1):
+            low = np.minimum(low, np.roll(z, shift, axis=axis))
+    low = np.maximum(low, reach_mm)
+    parts = []
+    for down in np.arange(0.0, max(float((z - low).max()), 0.0) + _DENSE_MM, _DENSE_MM):
+        some = (z - down >= low) & (z >= reach_mm)
+        parts.append(np.stack([x[some], y[some], z[some] - down], axis=1))
+    return np.concatenate(parts)

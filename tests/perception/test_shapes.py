@@ -1,0 +1,166 @@
+"""Shapes are told apart by what their scans have in common, and strangers are not guessed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.perception.synthetic import REACH_MM, felt, trials
+
+from setae.arc import FloatArray
+from setae.errors import InputError
+from setae.heightmap import HeightMap
+from setae.objects import SHAPES, ScanObject
+from setae.perception import classifier, paper
+from setae.perception.classifier import Model
+from setae.perception.features import FEATURES, described, scaled
+
+SEEDS = range(100, 105)
+LABELS = [shape for shape in SHAPES for _ in SEEDS]
+
+
+@pytest.fixture(scope="module")
+def maps() -> list[HeightMap]:
+    return [heights for shape in SHAPES for heights in trials(shape, SEEDS)]
+
+
+@pytest.fixture(scope="module")
+def vectors(maps: list[HeightMap]) -> FloatArray:
+    return np.stack([described(heights) for heights in maps])
+
+
+@pytest.fixture(scope="module")
+def model(vectors: FloatArray) -> Model:
+    return classifier.train(vectors, LABELS)
+
+
+def test_the_description_ignores_place_and_yaw() -> None:
+    here = felt(ScanObject(shape="eraser", x_mm=90, y_mm=110, yaw_deg=10), seed=1)
+    there = felt(ScanObject(shape="eraser", x_mm=117, y_mm=93, yaw_deg=131), seed=2)
+    assert np.abs(scaled(described(here)) - scaled(described(there))).max() < 3
+
+
+def test_the_description_ignores_the_height_of_the_arm(maps: list[HeightMap]) -> None:
+    one = maps[0]
+    raised = HeightMap(
+        x_mm=one.x_mm + 500, y_mm=one.y_mm, height_mm=one.height_mm + 40, mark=one.mark
+    )
+    assert described(raised) == pytest.approx(described(one), abs=1e-9)
+
+
+def test_scans_are_told_apart(vectors: FloatArray) -> None:
+    answers = classifier.leave_one_out(vectors, LABELS)
+    assert [answer.nearest for answer in answers] == LABELS
+    assert sum(not answer.known for answer in answers) <= 1
+    assert paper.silhouette(scaled(vectors), LABELS) > 0.5
+
+
+def test_the_silhouette_is_rousseeuws() -> None:
+    # By hand: the pair at 0 and 1 against the one at 5, which is alone.
+    line = np.array([[0.0], [1.0], [5.0]])
+    assert paper.silhouette(line, ["a", "a", "b"]) == pytest.approx((4 / 5 + 3 / 4) / 3)
+    assert np.isnan(paper.silhouette(line, ["a", "a", "a"]))
+
+
+def test_a_shape_that_was_never_seen_is_unknown(vectors: FloatArray) -> None:
+    answers = classifier.leave_shape_out(vectors, LABELS)
+    for shape in SHAPES:
+        unknown = [not a.known for a, label in zip(answers, LABELS, strict=True) if label == shape]
+        assert np.mean(unknown) >= 0.8, shape
+
+
+def test_a_scan_in_between_is_not_sure(model: Model) -> None:
+    between = (model.means[0] + model.means[1]) / 2
+    assert model.answer(between).confidence < 0.9
+    sure = model.answer(model.means[0])
+    assert sure.shape == model.shapes[0]
+    assert sure.confidence > 0.99
+    assert sum(sure.shares.values()) == pytest.approx(1)
+
+
+def test_one_scan_of_each_will_do_for_a_start(vectors: FloatArray) -> None:
+    first = [LABELS.index(shape) for shape in SHAPES]
+    model = classifier.train(vectors[first], SHAPES)
+    others = [i for i in range(len(LABELS)) if i not in first]
+    right = [model.answer(vectors[i]).nearest == LABELS[i] for i in others]
+    assert np.mean(right) >= 0.9
+
+
+def test_a_model_survives_its_file(model: Model, vectors: FloatArray, tmp_path: Path) -> None:
+    again = classifier.load(classifier.save(tmp_path / "shapes.json", model))
+    for vector in vectors[::6]:
+        assert again.answer(vector) == model.answer(vector)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"kind": "something else"},
+        {"features": ["weight"]},
+        {"shapes": {}},
+        {"shapes": {"egg": {"scans": 0, "mean": [0.0] * len(FEATURES)}}},
+        {"shapes": {"egg": {"scans": 1, "mean": [0.0]}}},
+        {"covariance": [[0.0] * len(FEATURES)] * len(FEATURES)},
+        {"covariance": None},
+        {"freedom": 1.0},
+        {"freedom": float("nan")},
+    ],
+)
+def test_a_strange_model_is_refused(
+    change: dict[str, object], model: Model, tmp_path: Path
+) -> None:
+    path = classifier.save(tmp_path / "shapes.json", model)
+    path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
+    with pytest.raises(InputError, match=r"shapes\.json"):
+        classifier.load(path)
+
+
+def test_a_scan_of_almost_nothing_has_no_shape() -> None:
+    empty = felt(ScanObject(shape="orange"))
+    nothing = HeightMap(
+        x_mm=empty.x_mm,
+        y_mm=empty.y_mm,
+        height_mm=np.full_like(empty.height_mm, np.nan),
+        mark=np.full_like(empty.mark, "empty"),
+    )
+    with pytest.raises(InputError, match="0 heights"):
+        described(nothing)
+    with pytest.raises(InputError, match="touched nothing"):
+        paper.normalised(nothing, reach_mm=REACH_MM)
+
+
+def test_a_row_of_points_has_a_description() -> None:
+    heights = np.full((21, 21), np.nan)
+    heights[10, 4:14] = -100.0
+    row = HeightMap(
+        x_mm=np.arange(0.0, 201.0, 10.0),
+        y_mm=np.arange(0.0, 201.0, 10.0),
+        height_mm=heights,
+        mark=np.where(np.isnan(heights), "empty", "felt"),
+    )
+    assert np.isfinite(described(row)).all()
+
+
+def test_the_papers_data_begin_at_the_least_touched_x_and_y() -> None:
+    one = felt(ScanObject(shape="coil", x_mm=80, y_mm=90), noise_mm=0.0, ragged=0.0)
+    other = felt(ScanObject(shape="coil", x_mm=120, y_mm=100), noise_mm=0.0, ragged=0.0)
+    data = paper.normalised(one, reach_mm=REACH_MM)
+    assert data.shape == (paper.ROWS * paper.COLUMNS,)
+    assert data == pytest.approx(paper.normalised(other, reach_mm=REACH_MM), abs=1e-9)
+    grid = data.reshape(paper.ROWS, paper.COLUMNS)
+    assert grid[:, 0].max() > 0
+    assert grid[0].max() > 0
+    # 28 mm high, and the tip's reach ends 3 mm above the table.
+    assert grid.max() == pytest.approx(25, abs=0.5)
+
+
+def test_t_sne_is_the_same_again_and_takes_few_trials(maps: list[HeightMap]) -> None:
+    data = np.stack([paper.normalised(heights, reach_mm=REACH_MM) for heights in maps])
+    plane = paper.embedded(data)
+    assert plane.shape == (25, 2)
+    assert (plane == paper.embedded(data)).all()
+    assert paper.embedded(data[:3]).shape == (3, 2)
+    with pytest.raises(InputError, match="three"):
+        paper.embedded(data[:2])
