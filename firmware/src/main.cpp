@@ -4,24 +4,24 @@
 //   A4 (SDA), A5 (SCL) pressure sensor, through a level shifter
 //   D4                 stop switch to ground, normally closed (optional)
 //   D0, D1 (USB)       the host
-#include <Arduino.h>
+#include <avr/interrupt.h>
 
 #include "board/board.h"
 #include "hal_uno/uno_hal.h"
 
 namespace {
 
-setae::UnoHal hal;
+setae::Hal hal;
 setae::Board board(hal);
 
 }  // namespace
 
-// Called by the Arduino core.
-void setup() {
-  hal.begin();
-}
-
-void loop() {
-  board.poll();
-  hal.service();
+// The Arduino core's own main() would start a timer, its interrupt and the ADC first.
+int main() {
+  setae::uno::begin();
+  sei();
+  for (;;) {
+    board.poll();
+    setae::uno::service();
+  }
 }

@@ -17,6 +17,11 @@ constexpr protocol::SetLimits kInitialLimits SETAE_FLASH = kDefaultLimits;
 
 }  // namespace
 
+Cell look_up(Mode mode, Event event) {
+  return Cell::from_byte(protocol::flash_read(
+      &state_table::kCells[static_cast<uint8_t>(event)][static_cast<uint8_t>(mode)]));
+}
+
 void Board::poll() {
   if (!started_)
     start();

@@ -39,8 +39,9 @@ namespace setae {
 
 class Board {
  public:
-  // Touches no hardware: that begins with the first poll().
-  explicit Board(Hal& hal) : hal_(hal), transmitter_(hal), store_(hal) {}
+  // Touches no hardware: that begins with the first poll(). All members begin as zeros, so that
+  // on the UNO it is made before the program starts, without code.
+  explicit constexpr Board(HalRef hal) : hal_(hal), transmitter_(hal), store_(hal) {}
 
   void poll();
 
@@ -126,7 +127,7 @@ class Board {
   SETAE_OWN_FRAME bool send_latched(Latch<Record>& latch);
   protocol::BoardHeader header() const;
 
-  Hal& hal_;
+  HalRef hal_;
   Receiver receiver_;
   Session session_;
   Transmitter transmitter_;
@@ -156,11 +157,11 @@ class Board {
   // Guarded move.
   protocol::Reflex reflex_ = protocol::Reflex::kHold;
   uint16_t retract_ticks_[protocol::kServos] = {};
-  uint16_t retract_slew_ticks_ = 1;
+  uint16_t retract_slew_ticks_ = 0;
   uint8_t guard_sequence_ = 0;
 
   // Sensor.
-  protocol::Sensor sensor_ = protocol::Sensor::kAbsent;
+  protocol::Sensor sensor_ = protocol::Sensor::kOk;  // from the first poll on
   SampleJudge judge_;
   protocol::Sensor judged_ = protocol::Sensor::kOk;  // of the last sample's value
   BoardTime sampled_ = {};                           // the last sample

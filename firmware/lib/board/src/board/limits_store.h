@@ -22,7 +22,7 @@ constexpr uint8_t kSlotBytes = kSlotHeaderBytes + protocol::SetLimits::kSize + p
 
 class LimitsStore {
  public:
-  explicit LimitsStore(Hal& hal) : hal_(hal) {}
+  explicit constexpr LimitsStore(HalRef hal) : hal_(hal) {}
 
   // False, and `limits` as they were, where none are stored.
   bool load(protocol::SetLimits& limits);
@@ -45,7 +45,7 @@ class LimitsStore {
  private:
   bool read(uint8_t slot, uint8_t* bytes) const;
 
-  Hal& hal_;
+  HalRef hal_;
   uint32_t crc_ = 0;
   uint8_t slot_ = 0;
   uint8_t generation_ = 0;

@@ -134,10 +134,8 @@ constexpr uint8_t kCells[kEventCount][kModeCount] SETAE_FLASH = {
 
 }  // namespace state_table
 
-inline Cell look_up(Mode mode, Event event) {
-  return Cell::from_byte(protocol::flash_read(
-      &state_table::kCells[static_cast<uint8_t>(event)][static_cast<uint8_t>(mode)]));
-}
+// In board.cpp: each file that read the table would get a copy of it.
+Cell look_up(Mode mode, Event event);
 
 constexpr protocol::State state_of(Mode mode) {
   return mode == Mode::kRelaxed   ? protocol::State::kRelaxed

@@ -64,7 +64,7 @@ class Detector {
 
   protocol::Guard guard_ = protocol::Guard::kOff;
   uint32_t threshold_raw_ = 0;
-  uint8_t consecutive_ = 1;
+  uint8_t consecutive_ = 0;
   uint16_t deadline_frames_ = 0;
 
   RestLevel rest_;

@@ -32,48 +32,68 @@ struct LineErrors {
   uint8_t dropped;  // the loop came too late: the ring was full
 };
 
+// A computer runs several boards at a time, and tests answer for some of them: calls are virtual.
+// The UNO is one machine, known when the firmware is linked: there they are plain functions of
+// hal_uno, with nothing to keep and nothing to look up.
+#ifdef __AVR__
+#define SETAE_ASK static
+#define SETAE_ANSWER
+#else
+#define SETAE_ASK virtual
+#define SETAE_ANSWER = 0
+#endif
+
 class Hal {
  public:
-  virtual BoardTime now() = 0;
+  SETAE_ASK BoardTime now() SETAE_ANSWER;
 
   // Serial line: what has come, and what is to go. The board reads the one and writes the other.
-  virtual ReceiveRing& received() = 0;
-  virtual TransmitRing& to_send() = 0;
+  SETAE_ASK ReceiveRing& received() SETAE_ANSWER;
+  SETAE_ASK TransmitRing& to_send() SETAE_ANSWER;
   // After each publish().
-  virtual void start_sending() = 0;
+  SETAE_ASK void start_sending() SETAE_ANSWER;
   // What the line lost; each modulo 256.
-  virtual LineErrors line_errors() = 0;
+  SETAE_ASK LineErrors line_errors() SETAE_ANSWER;
 
   // Pulses for the next servo frame and those after it. The last call before a
   // frame starts counts, for all servos at once. Bit i of `attached`: servo i
   // gets pulses.
   // Returns the frame that was running at that moment; a loop that looks at the time itself can
   // be overtaken by the next frame before it calls.
-  virtual uint32_t set_pulses(const Pulses& pulses, uint8_t attached) = 0;
+  SETAE_ASK uint32_t set_pulses(const Pulses& pulses, uint8_t attached) SETAE_ANSWER;
   // Edges that were armed too late, modulo 256.
-  virtual uint8_t late_pulses() = 0;
+  SETAE_ASK uint8_t late_pulses() SETAE_ANSWER;
 
   // Never waits longer than 1 ms.
-  virtual SensorReading read_sensor() = 0;
+  SETAE_ASK SensorReading read_sensor() SETAE_ANSWER;
 
   // It is being fetched: soon read_sensor() has it.
-  virtual bool sample_on_its_way() = 0;
+  SETAE_ASK bool sample_on_its_way() SETAE_ANSWER;
 
-  virtual protocol::ResetCause reset_cause() = 0;
-  virtual Retained& retained() = 0;
+  SETAE_ASK protocol::ResetCause reset_cause() SETAE_ANSWER;
+  SETAE_ASK Retained& retained() SETAE_ANSWER;
 
   // The bandgap in parts of the supply, see supply.h; 0 before it was measured.
-  virtual uint16_t bandgap_part() = 0;
+  SETAE_ASK uint16_t bandgap_part() SETAE_ANSWER;
   // The normally closed switch; open, too, where there is none.
-  virtual bool stop_switch_open() = 0;
+  SETAE_ASK bool stop_switch_open() SETAE_ANSWER;
 
   // A byte takes 3.4 ms to write. Neither reading nor writing is allowed before it is ready.
-  virtual bool eeprom_ready() = 0;
-  virtual uint8_t eeprom_read(uint16_t address) = 0;
-  virtual void eeprom_write(uint16_t address, uint8_t value) = 0;
+  SETAE_ASK bool eeprom_ready() SETAE_ANSWER;
+  SETAE_ASK uint8_t eeprom_read(uint16_t address) SETAE_ANSWER;
+  SETAE_ASK void eeprom_write(uint16_t address, uint8_t value) SETAE_ANSWER;
 
+#ifndef __AVR__
  protected:
   ~Hal() = default;
+#endif
 };
+
+// What keeps hold of one.
+#ifdef __AVR__
+using HalRef = Hal;
+#else
+using HalRef = Hal&;
+#endif
 
 }  // namespace setae

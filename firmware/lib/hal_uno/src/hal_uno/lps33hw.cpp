@@ -51,12 +51,14 @@ void start_timer(uint16_t ticks) {
     rounds_left = static_cast<uint8_t>((ticks - 1) >> 8);
     OCR0A = static_cast<uint8_t>(TCNT0 + ticks);
     TIFR0 = _BV(OCF0A);
-    TIMSK0 = kTimerOn;
+    TIMSK0 |= kTimerOn;
   }
 }
 
 void stop_handlers() {
-  TIMSK0 = 0;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {  // unit B is the servos'
+    TIMSK0 &= static_cast<uint8_t>(~kTimerOn);
+  }
   EIMSK = 0;
 }
 
@@ -71,8 +73,6 @@ void Lps33hw::begin() {
   // Weakly up: high for ever where nothing is wired.
   PORTD |= _BV(PORTD2);
   EICRA = _BV(ISC01) | _BV(ISC00);  // rising
-  TCCR0A = 0;
-  TCCR0B = _BV(CS02);  // 16 MHz / 256
   stop_handlers();
   twi_.begin();
 }

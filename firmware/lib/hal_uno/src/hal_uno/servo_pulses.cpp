@@ -6,17 +6,17 @@
 
 // Timer1 runs at 0.5 us a tick. Its unit A walks through the frame (frame_start is F):
 //
-//   F               the pulses last set become this frame's
-//   F + kRise1      OC1A and OC1B rise; each falls by itself after its width
+//   F           the pulses last set become this frame's
+//   F + kRise   OC1A, OC1B, OC2A and OC2B rise; the first two fall by themselves after their width
 //   (OC1A's fall)
-//   F + kRise2      OC2A and OC2B rise; each falls after its width
 //
-// Timer2 has 8 bits only: it matches every 128 us. So units A and B of Timer1, which are free by
-// then, wake a little ahead of each of its edges and arm it for Timer2's next match. Both timers
-// start together and divide alike, hence Timer2 equals the low byte of Timer1.
+// Timer2 has 8 bits only: it matches every 128 us. So Timer0's unit B wakes ahead of each of its
+// falls and arms it for Timer2's next match. Timers 1 and 2 start together and divide alike, hence
+// Timer2 equals the low byte of Timer1. Timer0 counts 32 of their ticks at a time, which is exact
+// enough to wake by.
 //
 // A handler arms an edge and never makes one. What comes too late even for that is counted, and
-// leaves a pulse out rather than letting it run on.
+// leaves a pulse out, or ends it, rather than letting it run on.
 
 namespace setae {
 namespace servo_pulses {
@@ -27,16 +27,16 @@ constexpr uint16_t kFrameTicks = protocol::kServoFrameUs * protocol::kPulseTicks
 // late; the rest is for its own work.
 constexpr uint16_t kLateTicks = 90;
 constexpr uint16_t kWorkTicks = 25;
-constexpr uint16_t kAheadTicks = 120;
-constexpr uint16_t kRise1 = kAheadTicks;
-constexpr uint16_t kWake2 =
-    kRise1 + protocol::kPulseTicksAbsoluteMax + kLateTicks + kWorkTicks;  // both have fallen
-constexpr uint16_t kRise2 = kWake2 + kAheadTicks;
-static_assert(kAheadTicks > kLateTicks + kWorkTicks, "an edge must be armed before it is due");
-static_assert(kAheadTicks < 256, "Timer2 would match too early");
-static_assert(protocol::kPulseTicksAbsoluteMin > 2 * kAheadTicks, "");
-static_assert(kRise2 + protocol::kPulseTicksAbsoluteMax <= 5200 * protocol::kPulseTicksPerUs,
-              "all four pulses must end within 5.2 ms");
+constexpr uint16_t kRise = 120;
+// A fall of Timer2's is armed so long before it. Timer0 may wake up to two of its ticks early.
+constexpr uint16_t kTimer0Ticks = 32;
+constexpr uint16_t kFallAhead = 180;
+constexpr uint16_t kFallAheadMost = kFallAhead + 2 * kTimer0Ticks;
+static_assert(kRise > kLateTicks + kWorkTicks, "an edge must be armed before it is due");
+static_assert(kFallAhead > kLateTicks + kWorkTicks, "an edge must be armed before it is due");
+static_assert(kRise < 256 && kFallAheadMost < 256, "Timer2 would match too early");
+static_assert(protocol::kPulseTicksAbsoluteMin > kFallAheadMost + kLateTicks, "");
+static_assert(kRise + protocol::kPulseTicksAbsoluteMax < 255 * kTimer0Ticks, "Timer0 wraps");
 
 // At its next match the unit lowers its pin, or raises it.
 constexpr uint8_t kLower1 = _BV(COM1A1) | _BV(COM1B1);
@@ -47,12 +47,18 @@ constexpr uint8_t kRaise2A = _BV(COM2A0);
 constexpr uint8_t kRaise2B = _BV(COM2B0);
 constexpr uint8_t kRaise[protocol::kServos] = {kRaise1A, kRaise1B, kRaise2A, kRaise2B};
 
-// One frame's pulses as the handlers use them: from the frame's start, servos 0 and 1: when they
-// fall, 2 and 3: when to arm that.
+// Timer0's ticks, rounded down, until a fall has to be armed that is so far away.
+constexpr uint8_t timer0_wait(uint16_t ticks) {
+  return static_cast<uint8_t>(static_cast<uint16_t>(ticks - kFallAhead) * (256 / kTimer0Ticks) /
+                              256);
+}
+
+// One frame's pulses as the handlers use them.
 struct Output {
-  uint16_t end[protocol::kServos];
-  uint8_t rise1;  // for TCCR1A: a servo without pulses is lowered once more
-  uint8_t rise2;  // for TCCR2A
+  uint16_t end[protocol::kServos];  // from the frame's start
+  uint8_t wait;                     // Timer0's ticks, from the rise to the first wake
+  uint8_t rise1;                    // for TCCR1A: a servo without pulses is lowered once more
+  uint8_t rise2;                    // for TCCR2A
 };
 
 // One is this frame's, the other the loop may write, with interrupts off.
@@ -80,6 +86,8 @@ void begin() {
     PORTD &= static_cast<uint8_t>(~_BV(PORTD3));
     DDRB |= _BV(DDB1) | _BV(DDB2) | _BV(DDB3);
     DDRD |= _BV(DDD3);
+    TCCR0A = 0;
+    TCCR0B = _BV(CS02);                             // 16 MHz / 256
     GTCCR = _BV(TSM) | _BV(PSRASY) | _BV(PSRSYNC);  // hold both prescalers
     TCNT1 = 0;
     TCNT2 = 0;
@@ -106,10 +114,12 @@ uint32_t set(const Pulses& pulses, uint8_t attached) {
       ticks = protocol::kPulseTicksAbsoluteMin;
     if (ticks > protocol::kPulseTicksAbsoluteMax)
       ticks = protocol::kPulseTicksAbsoluteMax;
-    output.end[i] = ticks + (i < 2 ? kRise1 : kWake2);
+    output.end[i] = ticks + kRise;
     if ((attached >> i) & 1)
       (i < 2 ? output.rise1 : output.rise2) |= kRaise[i];
   }
+  const uint16_t first = output.end[2] < output.end[3] ? output.end[2] : output.end[3];
+  output.wait = timer0_wait(first - kRise);
   uint32_t running;
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
     wanted = current == &outputs[0] ? &outputs[1] : &outputs[0];
@@ -170,65 +180,81 @@ uint8_t late_armings() {
 ISR(TIMER1_COMPA_vect) {
   using namespace setae::servo_pulses;
   const uint16_t woke = OCR1A;
-  const bool on_time = static_cast<uint16_t>(TCNT1 - woke) <= kLateTicks;
   const uint8_t now_step = step;
+  const bool on_time = static_cast<uint16_t>(TCNT1 - woke) <= kLateTicks;
   step = now_step + 1;
   if (now_step == 0) {  // woke at F
     frame_start = woke;
     ++frame;
     current = wanted;
     if (on_time) {
+      // First where, then what: until then a match repeats the level that the pin has.
+      OCR1A = woke + kRise;
+      OCR1B = woke + kRise;
+      OCR2A = static_cast<uint8_t>(woke + kRise);
+      OCR2B = static_cast<uint8_t>(woke + kRise);
       TCCR1A = current->rise1;
-      OCR1A = woke + kRise1;
-      OCR1B = woke + kRise1;
+      TCCR2A = current->rise2;
       return;
     }
-  } else if (now_step == 1) {  // both are up
+    ++late;
+  } else if (now_step == 1) {  // all four are up
     TCCR1A = kLower1;
     if (on_time) {
       OCR1A = frame_start + current->end[0];
       OCR1B = frame_start + current->end[1];
+      OCR0B = static_cast<uint8_t>(TCNT0 + current->wait);
+      TIFR0 = _BV(OCF0B);
+      TIMSK0 |= _BV(OCIE0B);
       return;
     }
+    TCCR2A = kLower2;
     TCCR1C = _BV(FOC1A) | _BV(FOC1B);
-  } else if (now_step == 2) {  // servo 0's pulse is over
-    if (on_time) {
-      OCR1A = frame_start + kWake2;
-      return;
-    }
-  } else if (now_step == 3) {
-    if (on_time) {
-      // First where, then what: until then a match repeats the level that the pin has.
-      OCR2A = static_cast<uint8_t>(woke + kAheadTicks);
-      OCR2B = static_cast<uint8_t>(woke + kAheadTicks);
-      TCCR2A = current->rise2;
-      OCR1A = frame_start + current->end[2];
-      OCR1B = frame_start + current->end[3];
-      TIFR1 = _BV(OCF1B);
-      TIMSK1 = _BV(OCIE1A) | _BV(OCIE1B);
-      return;
-    }
-  } else {
-    OCR2A = static_cast<uint8_t>(woke + kAheadTicks);
-    TCCR2A &= static_cast<uint8_t>(~kRaise2A);
-    if (!on_time)
-      TCCR2B |= _BV(FOC2A);
-  }
-  if (!on_time)
+    TCCR2B |= _BV(FOC2A) | _BV(FOC2B);
     ++late;
+  }  // else servo 0's pulse is over
   step = 0;
   OCR1A = frame_start + kFrameTicks;
 }
 
-// Ahead of the fall of servo 3's pulse.
-ISR(TIMER1_COMPB_vect) {
+// Ahead of the fall of servo 2's pulse, or 3's, or both. One that is to fall yet is in the mode in
+// which it rose.
+ISR(TIMER0_COMPB_vect) {
   using namespace setae::servo_pulses;
-  const uint16_t woke = OCR1B;
-  OCR2B = static_cast<uint8_t>(woke + kAheadTicks);
-  TCCR2A &= static_cast<uint8_t>(~kRaise2B);
-  if (static_cast<uint16_t>(TCNT1 - woke) > kLateTicks) {
-    TCCR2B |= _BV(FOC2B);
-    ++late;
+  const uint16_t now = TCNT1 - frame_start;
+  uint8_t mode = TCCR2A;
+  uint16_t soonest = 0;
+  if (mode & kRaise2A) {
+    const int16_t left = static_cast<int16_t>(current->end[2] - now);
+    if (left <= static_cast<int16_t>(kFallAheadMost)) {
+      OCR2A = static_cast<uint8_t>(frame_start + current->end[2]);
+      mode &= static_cast<uint8_t>(~kRaise2A);
+      TCCR2A = mode;
+      if (left < static_cast<int16_t>(kWorkTicks)) {
+        TCCR2B |= _BV(FOC2A);
+        ++late;
+      }
+    } else {
+      soonest = static_cast<uint16_t>(left);
+    }
   }
-  TIMSK1 = _BV(OCIE1A);
+  if (mode & kRaise2B) {
+    const int16_t left = static_cast<int16_t>(current->end[3] - now);
+    if (left <= static_cast<int16_t>(kFallAheadMost)) {
+      OCR2B = static_cast<uint8_t>(frame_start + current->end[3]);
+      mode &= static_cast<uint8_t>(~kRaise2B);
+      TCCR2A = mode;
+      if (left < static_cast<int16_t>(kWorkTicks)) {
+        TCCR2B |= _BV(FOC2B);
+        ++late;
+      }
+    } else if (soonest == 0 || static_cast<uint16_t>(left) < soonest) {
+      soonest = static_cast<uint16_t>(left);
+    }
+  }
+  if (soonest != 0) {
+    OCR0B = static_cast<uint8_t>(TCNT0 + timer0_wait(soonest));
+  } else {
+    TIMSK0 &= static_cast<uint8_t>(~_BV(OCIE0B));
+  }
 }

@@ -5,7 +5,9 @@
 #include <avr/wdt.h>
 #include <util/atomic.h>
 
+#include "hal/hal.h"
 #include "hal_uno/eeprom.h"
+#include "hal_uno/lps33hw.h"
 #include "hal_uno/retained_memory.h"
 #include "hal_uno/servo_pulses.h"
 #include "hal_uno/stop_switch.h"
@@ -14,6 +16,8 @@
 
 namespace setae {
 namespace {
+
+Lps33hw sensor;
 
 // After 0.25 s without service() the watchdog interrupts, after as much again it resets: the
 // interrupt says why, and lets the pulses end where a reset would cut one short.
@@ -27,19 +31,18 @@ void start_watchdog() {
 
 }  // namespace
 
-void UnoHal::begin() {
+void uno::begin() {
   retained_memory::begin();
   eeprom::begin();
   supply::begin();
   stop_switch::begin();
   uart::begin();
-  TIMSK0 = 0;  // the Arduino core's millis(), which nothing here uses
   servo_pulses::begin();
-  sensor_.begin();
+  sensor.begin();
   start_watchdog();
 }
 
-void UnoHal::service() {
+void uno::service() {
   if (retained_memory::stall_marked()) {  // it was slow, but it did turn
     retained_memory::clear_stall();
     start_watchdog();
@@ -47,67 +50,67 @@ void UnoHal::service() {
   wdt_reset();
 }
 
-BoardTime UnoHal::now() {
+BoardTime Hal::now() {
   return servo_pulses::now();
 }
 
-ReceiveRing& UnoHal::received() {
+ReceiveRing& Hal::received() {
   return uart::received();
 }
 
-TransmitRing& UnoHal::to_send() {
+TransmitRing& Hal::to_send() {
   return uart::to_send();
 }
 
-void UnoHal::start_sending() {
+void Hal::start_sending() {
   uart::start_sending();
 }
 
-LineErrors UnoHal::line_errors() {
+LineErrors Hal::line_errors() {
   return uart::errors();
 }
 
-uint32_t UnoHal::set_pulses(const Pulses& pulses, uint8_t attached) {
+uint32_t Hal::set_pulses(const Pulses& pulses, uint8_t attached) {
   return servo_pulses::set(pulses, attached);
 }
 
-SensorReading UnoHal::read_sensor() {
-  return sensor_.poll(servo_pulses::now());
+SensorReading Hal::read_sensor() {
+  return sensor.poll(servo_pulses::now());
 }
 
-bool UnoHal::sample_on_its_way() {
-  return sensor_.fetching();
+bool Hal::sample_on_its_way() {
+  return sensor.fetching();
 }
 
-protocol::ResetCause UnoHal::reset_cause() {
+protocol::ResetCause Hal::reset_cause() {
   return retained_memory::reset_cause();
 }
 
-Retained& UnoHal::retained() {
+Retained& Hal::retained() {
   return retained_memory::content();
 }
 
-uint8_t UnoHal::late_pulses() {
+uint8_t Hal::late_pulses() {
   return servo_pulses::late_armings();
 }
 
-uint16_t UnoHal::bandgap_part() {
+uint16_t Hal::bandgap_part() {
   return supply::bandgap_part();
 }
 
-bool UnoHal::stop_switch_open() {
+bool Hal::stop_switch_open() {
   return stop_switch::open();
 }
 
-bool UnoHal::eeprom_ready() {
+bool Hal::eeprom_ready() {
   return eeprom::ready();
 }
 
-uint8_t UnoHal::eeprom_read(uint16_t address) {
+uint8_t Hal::eeprom_read(uint16_t address) {
   return eeprom::read(address);
 }
 
-void UnoHal::eeprom_write(uint16_t address, uint8_t value) {
+void Hal::eeprom_write(uint16_t address, uint8_t value) {
   eeprom::write(address, value);
 }
 

@@ -7,7 +7,7 @@ namespace {
 // The line gets each run of bytes as soon as it is stuffed.
 class LineSink {
  public:
-  explicit LineSink(Hal& hal) : hal_(hal), ring_(hal.to_send()), start_(ring_.head) {}
+  explicit LineSink(HalRef hal) : hal_(hal), ring_(hal.to_send()), start_(ring_.head) {}
   void stage(uint8_t index, uint8_t byte) {
     ring_.stage(static_cast<uint8_t>(start_ + index), byte);
   }
@@ -17,7 +17,7 @@ class LineSink {
   }
 
  private:
-  Hal& hal_;
+  HalRef hal_;
   TransmitRing& ring_;
   const uint8_t start_;
 };

@@ -16,7 +16,7 @@ class Transmitter {
   static constexpr uint8_t kAheadBytes = 24;
   static_assert(kAheadBytes + protocol::kFrameWireBytesMax <= kTransmitRingBytes, "");
 
-  explicit Transmitter(Hal& hal) : hal_(hal) {}
+  explicit constexpr Transmitter(HalRef hal) : hal_(hal) {}
 
   // Whether send() would send now.
   bool ready() { return hal_.to_send().size() <= kAheadBytes; }
@@ -32,7 +32,7 @@ class Transmitter {
   bool send_bytes(protocol::BoardHeader header, protocol::MessageType type, const uint8_t* payload,
                   uint8_t size);
 
-  Hal& hal_;
+  HalRef hal_;
   uint8_t sequence_ = 0;
 };
 

@@ -31,7 +31,7 @@ class Line {
     uint16_t fraction;   // n-ths of a tick that are owed
   };
 
-  Axis axes_[protocol::kServos];
+  Axis axes_[protocol::kServos] = {};
   uint16_t frames_ = 0;
   uint16_t frames_left_ = 0;
 };

@@ -34,7 +34,7 @@ class SegmentQueue {
     return at < protocol::kSegmentQueueSlots ? at : at - protocol::kSegmentQueueSlots;
   }
 
-  protocol::Segment slots_[protocol::kSegmentQueueSlots];
+  protocol::Segment slots_[protocol::kSegmentQueueSlots] = {};
   uint8_t front_ = 0;
   uint8_t size_ = 0;
 };

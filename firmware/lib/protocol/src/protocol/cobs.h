@@ -75,8 +75,8 @@ class CobsDecoder {
       return Step::kByte;
     }
     left_ = static_cast<uint8_t>(wire - 1);
-    const bool first = empty_;
-    empty_ = false;
+    const bool first = !begun_;
+    begun_ = true;
     if (first)
       return Step::kNothing;
     out = 0;  // each code byte but the first stands where a zero was
@@ -90,15 +90,15 @@ class CobsDecoder {
   // Whether the frame may end here: its last run is complete.
   bool complete() const { return left_ == 0; }
   // No byte since the start.
-  bool empty() const { return empty_; }
+  bool empty() const { return !begun_; }
   void restart() {
     left_ = 0;
-    empty_ = true;
+    begun_ = false;
   }
 
  private:
   uint8_t left_ = 0;  // bytes left in the run
-  bool empty_ = true;
+  bool begun_ = false;
 };
 
 }  // namespace protocol

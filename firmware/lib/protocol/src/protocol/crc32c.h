@@ -16,6 +16,10 @@ extern const Crc32cTable kCrc32cTable;
 
 class Crc32c {
  public:
+  constexpr Crc32c() = default;
+  // Of nothing, not even of no bytes: to be assigned before use. All zeros, as memory is at first.
+  static constexpr Crc32c none() { return Crc32c(0); }
+
   SETAE_HOT void add(uint8_t byte) {
 #ifdef __AVR__
     // 23 cycles; the compiler's own takes twice as long.
@@ -52,6 +56,8 @@ class Crc32c {
   bool matched() const { return register_ == kResidue; }
 
  private:
+  constexpr explicit Crc32c(uint32_t content) : register_(content) {}
+
   static constexpr uint32_t kResidue = 0xB798B438;
 
   uint32_t register_ = 0xFFFFFFFF;

@@ -17,12 +17,12 @@ uint8_t smallest(uint8_t a, uint8_t b) {
 
 uint8_t FrameDecoder::take(const uint8_t* wire, uint8_t count, bool& good) {
   good = false;
-  if (ended_) {
+  if (!inside_) {
     cobs_.restart();
     crc_ = Crc32c();
     size_ = 0;
     too_long_ = false;
-    ended_ = false;
+    inside_ = true;
   }
   CobsDecoder cobs = cobs_;  // copies that can stay in registers
   Crc32c crc = crc_;
@@ -51,7 +51,7 @@ uint8_t FrameDecoder::take(const uint8_t* wire, uint8_t count, bool& good) {
     const uint8_t coded = *wire++;
     --left;
     if (coded == 0) {
-      ended_ = true;
+      inside_ = false;
       break;
     }
     uint8_t byte;
@@ -68,7 +68,7 @@ uint8_t FrameDecoder::take(const uint8_t* wire, uint8_t count, bool& good) {
   cobs_ = cobs;
   crc_ = crc;
   size_ = static_cast<uint8_t>(kFrameBytesMax - room);
-  if (ended_)
+  if (!inside_)
     good = finish();
   return static_cast<uint8_t>(count - left);
 }

@@ -78,10 +78,10 @@ class FrameDecoder {
   bool finish();
 
   CobsDecoder cobs_;
-  Crc32c crc_;
-  uint8_t bytes_[kFrameBytesMax];
+  Crc32c crc_ = Crc32c::none();
+  uint8_t bytes_[kFrameBytesMax] = {};
   uint8_t size_ = 0;
-  bool ended_ = true;  // the next byte starts a frame
+  bool inside_ = false;  // of a frame
   bool too_long_ = false;
   uint8_t damaged_ = 0;
 };
