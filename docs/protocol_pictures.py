@@ -161,7 +161,7 @@ class Line:
 
     def _describe_board(self, frame: BoardFrame) -> str:
         header, message = frame.header, frame.message
-        state = State(header.state).name.lower()
+        state = frame.state.name.lower()
         words = type(message).__name__.removesuffix("Message").lower()
         if isinstance(message, Receipt):
             words += ": gap!" if message.gap else ""

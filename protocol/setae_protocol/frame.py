@@ -19,6 +19,7 @@ from setae_protocol.messages import (
     CRC_BYTES,
     FRAME_WIRE_BYTES_MAX,
     HOST_MESSAGES,
+    REFUSAL_WAITS,
     BoardHeader,
     BoardMessage,
     HelloReply,
@@ -73,6 +74,16 @@ class BoardFrame:
 
     header: BoardHeader
     message: BoardMessage
+
+    @property
+    def state(self) -> State:
+        """The board's state; ValueError in a hello's answer from a version that has others."""
+        return State(self.header.state & ~REFUSAL_WAITS)
+
+    @property
+    def refusal_waits(self) -> bool:
+        """Whether a refusal waits to be acknowledged."""
+        return bool(self.header.state & REFUSAL_WAITS)
 
 
 def encode(inside: bytes) -> bytes:
@@ -201,6 +212,6 @@ class BoardDecoder(Decoder[BoardFrame]):
             return Damage.BAD_VALUE
         header = BoardHeader.unpack(body[: BoardHeader.SIZE])
         # An answer to hello must be readable whatever states another version has.
-        if header.state >= _STATES and kind is not HelloReply:
+        if header.state & ~REFUSAL_WAITS >= _STATES and kind is not HelloReply:
             return Damage.BAD_VALUE
         return BoardFrame(header, message)

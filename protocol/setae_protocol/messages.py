@@ -46,6 +46,8 @@ TRIP_HISTORY_FRAMES: Final = 4
 """Servo frames whose pulses a trip record holds."""
 RECORD_REPEAT_FRAMES: Final = 5
 """Servo frames between repeats of an unacknowledged record."""
+REFUSAL_WAITS: Final = 128
+"""In the state of a board frame's header: a refusal waits to be acknowledged."""
 TARE_SAMPLES: Final = 8
 """Pressure samples averaged into the baseline when a guard is armed."""
 SENSOR_SILENT_FRAMES: Final = 5
@@ -61,7 +63,7 @@ PULSE_TICKS_ABSOLUTE_MAX: Final = 5000
 """Compiled-in upper bound of every pulse (2500 us)."""
 ATTACH_INTERVAL_FRAMES: Final = 5
 """Servo frames between attaching one servo and the next: one start-up current at a time."""
-SCHEMA_HASH: Final = 0x735AE189
+SCHEMA_HASH: Final = 0xF340D815
 """CRC-32C of what host and board must agree on; compared in the handshake."""
 CRC_BYTES: Final = 4
 HOST_OVERHEAD_BYTES: Final = 9
@@ -514,7 +516,8 @@ class BoardHeader:
         Motion epoch, modulo 256. A stop, trip, fault, refusal of motion and new session raise
         it.
     state
-        State of the board (State).
+        State of the board (State), and REFUSAL_WAITS while the host has not acknowledged a
+        refusal.
     """
 
     SIZE: ClassVar[int] = 7

@@ -53,6 +53,7 @@ CONSTANTS = (
     Constant("TELEMETRY_SAMPLES", 3, "Pressure-sample slots in one telemetry frame (75 Hz + 3 % gives two at most, three after a late poll)."),
     Constant("TRIP_HISTORY_FRAMES", 4, "Servo frames whose pulses a trip record holds."),
     Constant("RECORD_REPEAT_FRAMES", 5, "Servo frames between repeats of an unacknowledged record."),
+    Constant("REFUSAL_WAITS", 0x80, "In the state of a board frame's header: a refusal waits to be acknowledged."),
     Constant("TARE_SAMPLES", 8, "Pressure samples averaged into the baseline when a guard is armed."),
     Constant("SENSOR_SILENT_FRAMES", 5, "Servo frames without a fresh sample after which the sensor counts as silent."),
     Constant("SENSOR_STUCK_SAMPLES", 16, "Samples that agree in every bit after which the sensor counts as stuck (the LPS33HW's own noise is about 30 LSB)."),
@@ -264,7 +265,7 @@ BOARD_HEADER = Struct(
     "expected" / Int8ul * "Next reliable sequence number the board will accept: acknowledges all before it.",
     "credit" / Int8ul * "Free segment slots, once all commands before `expected` were carried out.",
     "epoch" / Int8ul * "Motion epoch, modulo 256. A stop, trip, fault, refusal of motion and new session raise it.",
-    "state" / Int8ul * "State of the board (State).",
+    "state" / Int8ul * "State of the board (State), and REFUSAL_WAITS while the host has not acknowledged a refusal.",
 )
 
 # ----------------------------------------------------------------------- messages

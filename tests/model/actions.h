@@ -38,7 +38,7 @@ static int up_goes(World* w, int action) {
       return 0;
     w->late = f;
   }
-  take_up(w, action != DO_line_delivers_up);
+  take_up(w);
   if (action == DO_line_delivers_up)
     host_takes(w, &f, 1);
   report(w);
@@ -197,12 +197,12 @@ static void forget(World* w) {
     if (t->acked)
       t->epoch = t->era = 0;
     if (t->done)
-      t->sent_clean = t->end = t->clean = 0;
+      t->end = 0;
   }
   if (w->board.guard == GUARD_OFF)
     w->board.guard_sequence = w->board.guard_command = 0;
   if (w->late.kind == RECORD || w->late.kind == PONG)
-    w->late.expected = w->late.credit = w->late.epoch = w->late.stopped = w->late.lost =
+    w->late.expected = w->late.credit = w->late.epoch = w->late.stopped = w->late.waits =
         w->late.era = 0;
 }
 

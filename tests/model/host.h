@@ -6,23 +6,19 @@
 
 enum { ASKING, OPENING, SETTLING, OPEN, FAILED };  // phases
 enum { REMEMBERED = 3 };                           // tickets that a refusal may still name
-enum { REPEAT_FRAMES = 1 };                        // RECORD_REPEAT_FRAMES
 
-// From the board. `lost`: the numbers show that frames before it were lost.
+// From the board. `waits`: a refusal waits to be acknowledged.
 typedef struct {
-  Byte kind, session, expected, credit, epoch, stopped;
+  Byte kind, session, expected, credit, epoch, stopped, waits;
   Byte token;  // or stop number
   Byte which, id, record_session, sequence, refused_kind;
-  Byte lost;
   Byte command, era;  // the judge's
 } Up;
 
 typedef struct {
   Byte kind, sequence, epoch, command, era;
-  Byte sent_clean;  // no board frame was lost since it was sent
-  Byte acked;       // the board has taken it
-  Byte end;         // what it will count as
-  Byte clean;       // telemetry without a loss since then
+  Byte acked;  // the board has taken it
+  Byte end;    // what it will count as
   Byte done;
 } Ticket;
 
@@ -31,7 +27,6 @@ typedef struct {
   Byte epoch, era, credit;
   Byte token;  // of the hello under way; 0: none
   Byte settled, heard_telemetry;
-  Byte missed;  // a frame whose number it did not note
   Byte next_sequence;
   Byte stop_under_way, stop_number, stop_shown_known, stop_shown, stop_user;
   Byte seen[LATCHES];         // ids that were told, a bit each
@@ -88,20 +83,8 @@ static int host_has_room(const Host* h) {
   return h->phase == OPEN && in_flight(h) < WINDOW && (!h->recent[0].kind || h->recent[0].done);
 }
 
-// Sees by the frame's number whether frames before it are missing.
-static void host_notes(Host* h, const Up* f) {
-  int i;
-  if (f->lost || h->missed)
-    for (i = 0; i < REMEMBERED; ++i)
-      h->recent[i].sent_clean = h->recent[i].clean = 0;
-  h->missed = 0;
-}
-
-static void host_on_header(Host* h, const Up* f) {
+static void host_on_acknowledgement(Host* h, const Up* f) {
   int i, confirmed, first = 0;
-  h->epoch = f->epoch;
-  h->era = f->era;
-  h->credit = f->credit;
   while (first < REMEMBERED && (!h->recent[first].kind || h->recent[first].acked))
     ++first;
   if (first == REMEMBERED)
@@ -113,25 +96,25 @@ static void host_on_header(Host* h, const Up* f) {
     Ticket* t = &h->recent[i];
     t->acked = 1;
     t->end = has_epoch(t->kind) && t->epoch != f->epoch ? DISCARDED : EXECUTED;
-    t->clean = 0;
-    if (plant == PLANT_RECEIPT_TRUSTED)
+  }
+}
+
+static void host_on_header(Host* h, const Up* f) {
+  int i;
+  h->epoch = f->epoch;
+  h->era = f->era;
+  h->credit = f->credit;
+  host_on_acknowledgement(h, f);
+  // Where no refusal waits, none names what was acknowledged.
+  for (i = 0; i < REMEMBERED; ++i) {
+    Ticket* t = &h->recent[i];
+    if (t->acked && !t->done && (!f->waits || plant == PLANT_RECEIPT_TRUSTED))
       t->done = t->end;
   }
 }
 
-// Settles the tickets of which no refusal can come any more.
 static void host_on_telemetry(Host* h, const Up* f) {
-  int i;
   h->heard_telemetry = 1;
-  for (i = 0; i < REMEMBERED; ++i) {
-    Ticket* t = &h->recent[i];
-    if (!t->kind || !t->acked || t->done)
-      continue;
-    if (t->sent_clean || t->clean > REPEAT_FRAMES)
-      t->done = t->end;
-    else
-      ++t->clean;
-  }
   if (h->stop_under_way && (f->token == h->stop_number || plant == PLANT_STOP_TRUSTED)) {
     if (!h->stop_shown_known)
       new_stop_number(h);

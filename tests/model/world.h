@@ -42,7 +42,7 @@ typedef struct {
   // To the host: in order, with losses, and one frame that comes late, as often as it likes.
   Up up[UP_SLOTS];
   Up late;
-  Byte up_count, up_lost;
+  Byte up_count;
 
   // How often it happened.
   Byte commands, stops, trips, faults, resets, switches, hosts;
@@ -101,7 +101,7 @@ static int send_up(World* w, int kind, int token, const Latch* record, int which
   f.stopped = b->mode == MODE_STOPPED || b->mode == MODE_FAULT;
   f.token = (Byte)token;
   f.era = w->era;
-  f.lost = w->up_lost;
+  f.waits = b->latch[REFUSAL].pending;
   if (record) {
     f.which = (Byte)which;
     f.id = record->id;
@@ -110,24 +110,16 @@ static int send_up(World* w, int kind, int token, const Latch* record, int which
     f.refused_kind = record->kind;
     f.command = record->command;
   }
-  w->up_lost = 0;
   w->up[w->up_count++] = f;
   return 1;
 }
 
-static void take_up(World* w, int lost) {
+static void take_up(World* w) {
   int i;
-  lost |= lost && w->up[0].lost;
   for (i = 0; i + 1 < UP_SLOTS; ++i)
     w->up[i] = w->up[i + 1];
   memset(&w->up[UP_SLOTS - 1], 0, sizeof w->up[0]);
   --w->up_count;
-  if (!lost)
-    return;
-  if (w->up_count)
-    w->up[0].lost = 1;
-  else
-    w->up_lost = 1;
 }
 
 // What is to be sent, the urgent first; nothing overtakes what finds no room.
@@ -289,14 +281,10 @@ static void next_host(World* w) {
   send_hello(w, 0);
 }
 
-static void host_on_hello(World* w, const Up* f, int fresh) {
+static void host_on_hello(World* w, const Up* f) {
   Host* h = &w->host;
-  if (in_session(h) && f->session == h->session) {
-    if (fresh)
-      host_notes(h, f);
+  if (in_session(h) && f->session == h->session)
     return;
-  }
-  h->missed = 1;
   if (f->token != h->token || !h->token)
     return;
   if (h->phase == ASKING) {
@@ -306,7 +294,7 @@ static void host_on_hello(World* w, const Up* f, int fresh) {
     send_hello(w, h->session);
   } else if (h->phase == OPENING && f->session == h->session) {
     h->phase = SETTLING;
-    h->token = h->missed = 0;
+    h->token = 0;
     h->epoch = f->epoch;
     h->era = f->era;
     h->credit = f->credit;
@@ -356,18 +344,15 @@ static void host_takes(World* w, const Up* f, int fresh) {
   if (h->phase == FAILED)
     return;
   if (f->kind == HELLO_REPLY) {
-    host_on_hello(w, f, fresh);
+    host_on_hello(w, f);
   } else if (!in_session(h)) {
     if (f->kind == RECEIPT && f->stopped)
       h->stop_under_way = 0;
   } else if (f->session != h->session) {
-    h->missed = 1;
     send_hello(w, 0);
   } else {
-    if (fresh) {
-      host_notes(h, f);
+    if (fresh)
       host_on_header(h, f);
-    }
     if (f->kind == TELEMETRY && fresh)
       host_on_telemetry(h, f);
     if (f->kind == RECORD)
@@ -395,7 +380,6 @@ static int host_commands(World* w, int kind) {
   t.epoch = has_epoch(kind) || kind == RESUME ? h->epoch : 0;
   t.era = has_epoch(kind) || kind == RESUME ? h->era : 0;
   t.command = ++w->commands;
-  t.sent_clean = 1;
   if (!w->first[h->session])
     w->first[h->session] = t.command;
   h->next_sequence = (Byte)((h->next_sequence + 1) % SEQUENCES);

@@ -30,7 +30,7 @@ START_TICKS = 1_800
 STEP_TICKS = 15
 GOOD = Faults()
 
-rates = st.sampled_from([0.0, 0.05, 0.15])
+rates = st.sampled_from([0.0, 0.1, 0.3])
 faults = st.builds(
     Faults,
     lose=rates,

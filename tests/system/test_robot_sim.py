@@ -44,7 +44,7 @@ LINES = {
 @pytest.mark.parametrize("name", LINES)
 def test_a_stop_in_mid_move_holds_whatever_the_line_does_until_resume(name: str) -> None:
     faults = LINES[name]
-    with compressed(seed=4, down=faults, up=faults) as made:
+    with compressed(seed=3, down=faults, up=faults) as made:
         robot = made.robot
         made.at(robot.now_us + 400_000, robot.session.send_stop)
         with pytest.raises(StoppedError):

@@ -99,7 +99,7 @@ class Witness:
             self.taken += (frame.header.expected - self._expected) & 0xFF
             self._expected = frame.header.expected
             if isinstance(message, Telemetry):
-                self._on_telemetry(message, State(frame.header.state))
+                self._on_telemetry(message, frame.state)
             elif isinstance(message, (Trip, FaultMessage, RefusalMessage)):
                 kind = type(message)
                 if message.record_id != self._last_ids.get(kind, 0):

@@ -17,15 +17,11 @@ class Arrivals:
 
     Attributes
     ----------
-    gaps
-        How often frames were missing. Whoever remembers it can tell later
-        whether a frame was lost meanwhile.
     heard_at_us
         When the newest frame came.
     """
 
     def __init__(self, statistics: Statistics) -> None:
-        self.gaps = 0
         self.heard_at_us = 0
         self._statistics = statistics
         self._last_sequence: int | None = None
@@ -42,9 +38,7 @@ class Arrivals:
         if not silent and (step == 0 or step >= 128):
             self._statistics.frames_late += 1
             return False
-        if step != 1 or silent:  # after a silence 257 lost frames look like none
-            self._statistics.frames_lost += (step - 1) & 0xFF
-            self.gaps += 1
+        self._statistics.frames_lost += (step - 1) & 0xFF
         self._last_sequence = sequence
         self.heard_at_us = now_us
         return True

@@ -40,7 +40,6 @@ from setae.link.timing import Timing
 from setae.link.verdicts import Verdicts
 from setae_protocol.frame import BoardDecoder, BoardFrame, Damage
 from setae_protocol.messages import (
-    BoardHeader,
     BoardMessage,
     FaultMessage,
     GuardMessage,
@@ -94,11 +93,11 @@ class Engine:
         self._arrivals = Arrivals(self.statistics)
         self._timing = Timing(self._outbox)
         self._handshake = Handshake(self._outbox, self._timing)
-        self._verdicts = Verdicts(self._arrivals)
+        self._verdicts = Verdicts()
         self._records = Records(self._outbox, self._verdicts)
         self._stops = Stops(self._outbox, self.statistics)
         self._reliable = ReliableSender(
-            self._outbox, self._arrivals, self._records, self._verdicts, self.statistics
+            self._outbox, self._records, self._verdicts, self.statistics
         )
 
     # --------------------------------------------------------------------- what is known
@@ -243,9 +242,9 @@ class Engine:
     def _on_frame(self, frame: BoardFrame, now_us: int) -> None:
         header, message = frame.header, frame.message
         if isinstance(message, HelloReply):
-            self._on_hello(header, message, now_us)
+            self._on_hello(frame, message, now_us)
         elif not self._handshake.in_session:
-            if isinstance(message, Receipt) and header.state in (State.STOPPED, State.FAULT):
+            if isinstance(message, Receipt) and frame.state in (State.STOPPED, State.FAULT):
                 self._stops.confirm()
         elif header.session != self.session:
             # From before our session, or from a reset board: only an answer tells.
@@ -254,28 +253,31 @@ class Engine:
         else:
             self.statistics.frames_received += 1
             fresh = self._arrivals.note(header.sequence, now_us)
-            confirmed = fresh and self._on_header(header, now_us)
+            confirmed = fresh and self._on_header(frame, now_us)
             self._on_message(message, now_us, fresh=fresh, confirmed=confirmed)
 
-    def _on_hello(self, header: BoardHeader, reply: HelloReply, now_us: int) -> None:
+    def _on_hello(self, frame: BoardFrame, reply: HelloReply, now_us: int) -> None:
+        header = frame.header
         if self._handshake.in_session and header.session == self.session:
             # It lives, only its telemetry is lost. Or a late answer of the handshake.
             self._arrivals.note(header.sequence, now_us)
         elif self._handshake.on_hello(header, reply, now_us):
             self._arrivals.start(header.sequence, now_us)
             self._reliable.board_credit = header.credit
-            self.state, self.epoch = State(header.state), header.epoch
+            self.state, self.epoch = frame.state, header.epoch
 
-    def _on_header(self, header: BoardHeader, now_us: int) -> bool:
+    def _on_header(self, frame: BoardFrame, now_us: int) -> bool:
         """Return whether it confirms a command."""
-        state = State(header.state)
+        header, state = frame.header, frame.state
         if (state, header.epoch) != (self.state, self.epoch):
             self._events.append(StateChanged(state, header.epoch, self.state, self.epoch, now_us))
             moved_on = header.epoch != self.epoch
             self.state, self.epoch = state, header.epoch
             if moved_on:
                 self._reliable.discard_stale(self.epoch)
-        return self._reliable.on_header(header, now_us)
+        confirmed = self._reliable.on_header(header, now_us)
+        self._verdicts.on_header(refusal_waits=frame.refusal_waits)
+        return confirmed
 
     def _on_message(
         self, message: BoardMessage, now_us: int, *, fresh: bool, confirmed: bool
@@ -305,7 +307,6 @@ class Engine:
         self._timing.on_telemetry(message, now_us)
         self._events.append(TelemetryReceived(message, self.state, self.epoch, self.credit, now_us))
         self._stops.on_telemetry(message)
-        self._verdicts.on_telemetry(message.frame)
         self._open_if_settled()
 
     def _on_pong(self, message: Pong, now_us: int) -> None:

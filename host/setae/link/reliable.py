@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Final
 
 from setae.errors import LinkLostError
-from setae.link.arrivals import Arrivals
 from setae.link.counts import Statistics
 from setae.link.events import Ticket, TicketState
 from setae.link.outbox import Outbox
@@ -25,7 +24,9 @@ from setae_protocol.messages import (
 
 __all__ = ["ReliableSender"]
 
-_TRIES_MAX: Final = 20
+# Both: a host that stood still for that long has not tried yet.
+_TRIES: Final = 20
+_LOST_US: Final = 4_000_000
 
 
 @dataclass(slots=True)
@@ -33,7 +34,6 @@ class _InFlight:
     ticket: Ticket
     sequence: int
     first_sent_us: int
-    gaps_when_sent: int
     transmissions: int = 1
 
 
@@ -51,7 +51,6 @@ class ReliableSender:
     def __init__(
         self,
         outbox: Outbox,
-        arrivals: Arrivals,
         records: Records,
         verdicts: Verdicts,
         statistics: Statistics,
@@ -59,7 +58,6 @@ class ReliableSender:
         self.timer = RetransmissionTimer()
         self.board_credit = 0
         self._outbox = outbox
-        self._arrivals = arrivals
         self._records = records
         self._verdicts = verdicts
         self._statistics = statistics
@@ -67,8 +65,11 @@ class ReliableSender:
         self._flight: deque[_InFlight] = deque()
         self._next_sequence = 0
         self._tries = 0
+        self._unconfirmed_since_us = 0
+        self._sent_at_us = 0
         self._timeout_at_us = 0
         self._resent_at_us: int | None = None
+        self._shown_missing = False
         self._refused = False
 
     @property
@@ -99,12 +100,13 @@ class ReliableSender:
             if isinstance(message, Segments) and self.credit < message.count:
                 return
             ticket = self._queue.popleft()
-            item = _InFlight(ticket, self._next_sequence, now_us, self._arrivals.gaps)
+            item = _InFlight(ticket, self._next_sequence, now_us)
             ticket.sequence = item.sequence
             ticket.state = TicketState.SENT
             self._next_sequence = (self._next_sequence + 1) & 0xFF
             if not self._flight:
-                self._timeout_at_us = now_us + self.timer.timeout_us
+                self._start_waiting(now_us)
+                self._unconfirmed_since_us = now_us
             self._flight.append(item)
             self._verdicts.remember(ticket)
             self._transmit(item)
@@ -115,16 +117,22 @@ class ReliableSender:
         Raises
         ------
         LinkLostError
-            It was sent often enough.
+            It was sent often enough, for long enough.
         """
         if not self._flight or now_us < self._timeout_at_us:
             return
         self._tries += 1
-        if self._tries > _TRIES_MAX:
+        if self._tries > _TRIES and now_us - self._unconfirmed_since_us >= _LOST_US:
             name = type(self._flight[0].ticket.message).__name__.lower()
-            raise LinkLostError(f"The board did not confirm `{name}` in {_TRIES_MAX} tries.")
+            raise LinkLostError(
+                f"The board did not confirm `{name}` in {self._tries - 1} tries"
+                f" and {_LOST_US / 1e6:.0f} s."
+            )
         self._statistics.timeouts += 1
-        self.timer.back_off()
+        if self._shown_missing:
+            self.timer.recover()
+        else:
+            self.timer.back_off()
         self._retransmit(now_us)
 
     def _transmit(self, item: _InFlight) -> None:
@@ -141,7 +149,12 @@ class ReliableSender:
             self._statistics.frames_retransmitted += 1
         self._resent_at_us = now_us
         self._refused = False
+        self._start_waiting(now_us)
+
+    def _start_waiting(self, now_us: int) -> None:
+        self._sent_at_us = now_us
         self._timeout_at_us = now_us + self.timer.timeout_us
+        self._shown_missing = False
 
     # ------------------------------------------------------------------------ receiving
 
@@ -157,17 +170,20 @@ class ReliableSender:
             return False
         confirmed = (header.expected - self._flight[0].sequence) & 0xFF
         if not 0 < confirmed <= len(self._flight):
+            # The board lives, and should have it by now: it is lost, not late.
+            if now_us - self._sent_at_us >= self.timer.estimate_us:
+                self._shown_missing = True
+                self._timeout_at_us = now_us
             return False
         for _ in range(confirmed):
             item = self._flight.popleft()
-            self._verdicts.acknowledged(
-                item.ticket, epoch=header.epoch, gaps_when_sent=item.gaps_when_sent
-            )
+            self._verdicts.acknowledged(item.ticket, epoch=header.epoch)
         if item.transmissions == 1:  # Karn: nobody knows which of several was answered
             self.timer.measure(now_us - item.first_sent_us)
         self._tries = 0
         self.timer.recover()
-        self._timeout_at_us = now_us + self.timer.timeout_us
+        self._start_waiting(now_us)
+        self._unconfirmed_since_us = now_us
         return True
 
     def on_refusal(self) -> None:

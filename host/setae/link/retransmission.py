@@ -44,12 +44,18 @@ class RetransmissionTimer:
             self._variation_us += (error - self._variation_us) / 4
             self.smoothed_us += (round_trip_us - self.smoothed_us) / 8
 
+    @property
+    def estimate_us(self) -> int:
+        """How long an answer takes at most, as far as is known (section 2)."""
+        if self.smoothed_us is None:
+            return _TIMEOUT_INITIAL_US
+        estimate_us = int(self.smoothed_us + 4 * self._variation_us)
+        return max(_TIMEOUT_FLOOR_US, min(_TIMEOUT_MAX_US, estimate_us))
+
     def recover(self) -> None:
-        """An answer came: wait as long as the estimate says."""
-        if self.smoothed_us is not None:
-            estimate_us = int(self.smoothed_us + 4 * self._variation_us)
-            self.timeout_us = max(_TIMEOUT_FLOOR_US, min(_TIMEOUT_MAX_US, estimate_us))
+        """The board was heard: wait as long as the estimate says."""
+        self.timeout_us = self.estimate_us
 
     def back_off(self) -> None:
-        """No answer came: wait twice as long (section 5.5)."""
+        """Nothing was heard: wait twice as long (section 5.5)."""
         self.timeout_us = min(2 * self.timeout_us, _TIMEOUT_MAX_US)

@@ -188,7 +188,9 @@ class Rig {
     run_frames(12);
   }
 
-  protocol::State state() const { return static_cast<protocol::State>(header.state); }
+  protocol::State state() const {
+    return static_cast<protocol::State>(header.state & ~protocol::kRefusalWaits);
+  }
   protocol::Refusal last_refusal() const {
     return refusals.empty() ? protocol::Refusal::kNone
                             : static_cast<protocol::Refusal>(refusals.back().message.reason);

@@ -14,6 +14,7 @@ from setae_protocol.frame import HostDecoder, HostFrame, encode_board
 from setae_protocol.messages import (
     PROTOCOL_VERSION,
     RECORD_REPEAT_FRAMES,
+    REFUSAL_WAITS,
     SCHEMA_HASH,
     SEGMENT_QUEUE_SLOTS,
     Acknowledge,
@@ -83,7 +84,7 @@ class ModelBoard:
                 expected=self.expected,
                 credit=SEGMENT_QUEUE_SLOTS - self.queued,
                 epoch=self.epoch,
-                state=self.state,
+                state=self.state | (REFUSAL_WAITS if self.pending(Record.REFUSAL) else 0),
             )
         )
         self.sequence = (self.sequence + 1) & 0xFF
@@ -215,7 +216,6 @@ class ModelBoard:
             self.refused.append(message)
             if isinstance(message, Segments):
                 self.freeze(State.HOLDING if self.state is State.MOVING else self.state)
-            self.say(Receipt(gap=0))
             self.latch(
                 Record.REFUSAL,
                 lambda i: RefusalMessage(
@@ -223,6 +223,7 @@ class ModelBoard:
                     reason=reason, index=255, value=0, limit=0,
                 ),
             )  # fmt: skip
+            self.say(Receipt(gap=0))
         else:
             self.executed.append(message)
             if isinstance(message, (Enable, Resume)):

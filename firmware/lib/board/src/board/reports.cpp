@@ -76,6 +76,8 @@ protocol::BoardHeader Board::header() const {
   header.credit = player_.room();
   header.epoch = epoch_;
   header.state = static_cast<uint8_t>(state_of(mode_));
+  if (refusal_.pending())
+    header.state |= protocol::kRefusalWaits;
   return header;
 }
 

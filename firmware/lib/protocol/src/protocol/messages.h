@@ -42,6 +42,8 @@ constexpr uint8_t kTelemetrySamples = 3;
 constexpr uint8_t kTripHistoryFrames = 4;
 // Servo frames between repeats of an unacknowledged record.
 constexpr uint8_t kRecordRepeatFrames = 5;
+// In the state of a board frame's header: a refusal waits to be acknowledged.
+constexpr uint8_t kRefusalWaits = 128;
 // Pressure samples averaged into the baseline when a guard is armed.
 constexpr uint8_t kTareSamples = 8;
 // Servo frames without a fresh sample after which the sensor counts as silent.
@@ -58,7 +60,7 @@ constexpr uint16_t kPulseTicksAbsoluteMax = 5000;
 // Servo frames between attaching one servo and the next: one start-up current at a time.
 constexpr uint8_t kAttachIntervalFrames = 5;
 // CRC-32C of what host and board must agree on; they compare it in the handshake.
-constexpr uint32_t kSchemaHash = 0x735AE189;
+constexpr uint32_t kSchemaHash = 0xF340D815;
 // CRC, COBS code byte and delimiter: what a frame has besides header and payload.
 constexpr uint8_t kCrcBytes = 4;
 constexpr uint8_t kStuffingBytes = 2;
@@ -360,7 +362,7 @@ struct BoardHeader {
   uint8_t credit;
   // Motion epoch, modulo 256. A stop, trip, fault, refusal of motion and new session raise it.
   uint8_t epoch;
-  // State of the board (State).
+  // State of the board (State), and REFUSAL_WAITS while the host has not acknowledged a refusal.
   uint8_t state;
 };
 
