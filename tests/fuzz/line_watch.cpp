@@ -48,7 +48,8 @@ void LineWatch::hear(const Inside& inside) {
   decode(inside.bytes, header);
   expect(!heard_ || header.sequence == static_cast<uint8_t>(last_.sequence + 1),
          "the board numbers its frames");
-  expect((header.state & ~protocol::kRefusalWaits) < protocol::kStateCount, "the board is in a state of the protocol");
+  expect((header.state & ~protocol::kRefusalWaits) < protocol::kStateCount,
+         "the board is in a state of the protocol");
   expect(header.credit <= protocol::kSegmentQueueSlots, "the board grants no room it lacks");
   heard_ = true;
   last_ = header;
@@ -141,8 +142,9 @@ void LineWatch::on_step(const Step& step) {
   expect(last_.epoch == step.after.epoch, "a frame says its epoch");
   expect(last_.credit == protocol::kSegmentQueueSlots - step.after.queued,
          "credit is the slots that are free");
-  expect((last_.state & ~protocol::kRefusalWaits) == static_cast<uint8_t>(state_of(step.after.mode)),
-         "a frame says the board's state");
+  expect(
+      (last_.state & ~protocol::kRefusalWaits) == static_cast<uint8_t>(state_of(step.after.mode)),
+      "a frame says the board's state");
   expect((last_.state & protocol::kRefusalWaits) != 0 == step.after.refusal_pending,
          "a frame says whether a refusal waits");
 }

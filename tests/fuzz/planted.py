@@ -100,7 +100,7 @@ BUGS: Final = (
         right="header.credit = player_.room();", wrong="header.credit = player_.room() + 1;",
         promise="room"),
     Bug(name="a_waiting_refusal_is_not_said", file=_REPORTS,
-        right="  if (refusal_.pending())\n    header.state |=", wrong="  if (false)\n    header.state |=",
+        right="    header.state |= protocol::kRefusalWaits;", wrong="    header.state |= 0;",
         promise="a frame says whether a refusal waits"),
     Bug(name="two_servos_attach_at_once", file=_COMMANDS,
         right="  attacher_.step(attached_);", wrong="  attached_ = 3;",
