@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from setae import contact as contacts
 from setae.board import REPLY_S, Board
@@ -37,6 +38,29 @@ _RETRIED = (Refusal.TARE_NOISY, Refusal.TARE_FAR)
 _GUARD_FRAMES_MAX = 0xFFFF
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Approach:
+    """What moves while the robot holds and the bristle watches.
+
+    Attributes
+    ----------
+    begin
+        Called once the bristle watches; starts the other motion.
+    busy
+        True while the other motion lasts.
+    abort
+        Ends the other motion at once: called before anything else is done about a
+        contact, or about whatever else went wrong.
+    timeout_s
+        For the other motion.
+    """
+
+    begin: Callable[[], object]
+    busy: Callable[[], bool]
+    abort: Callable[[], object]
+    timeout_s: float
+
+
 class Guarding:
     """Has the bristle watched while the robot, or something else, moves.
 
@@ -53,10 +77,19 @@ class Guarding:
         self._config = config
         self._retract_slew_ticks = ServoModel(config).speed_ticks(config.motion.retract_speed_mm_s)
 
-    def extend(self, planned: Planned, *, retract_ticks: Ticks) -> Contact | None:
-        """Play a motion; after a contact the board is tripped, and retracts."""
+    def extend(
+        self, planned: Planned, *, retract_ticks: Ticks, approach: Approach | None = None
+    ) -> Contact | None:
+        """Play a motion, after an approach if there is one.
+
+        After a contact the board is tripped, and retracts.
+        """
 
         def play_all() -> None:
+            if approach is not None:
+                self._await(approach)
+                if self._board.trip is not None:
+                    return
             play = self._board.playing(planned.segments)
             self._board.wait(
                 lambda: (
@@ -70,48 +103,41 @@ class Guarding:
             # The servos lag, and so does the pressure: it watches on for a moment.
             self._board.pause(_SETTLE_S)
 
+        approach_s = 0.0 if approach is None else approach.timeout_s
         return self._guarded(
             play_all,
-            limit_s=planned.duration_s + _SETTLE_S + 2 * REPLY_S,
+            limit_s=approach_s + planned.duration_s + _SETTLE_S + 2 * REPLY_S,
             reflex=Reflex.RETRACT,
             retract_ticks=retract_ticks,
         )
 
-    def watch(
-        self,
-        begin: Callable[[], object],
-        busy: Callable[[], bool],
-        abort: Callable[[], object],
-        *,
-        timeout_s: float,
-        retract_ticks: Ticks | None = None,
-    ) -> Contact | None:
+    def watch(self, approach: Approach, *, retract_ticks: Ticks | None = None) -> Contact | None:
         """Hold while something else moves; after a contact the board is tripped.
 
         It then holds, or retracts by itself where it is told whereto.
         """
-
-        def act() -> None:
-            try:
-                begin()
-                self._board.wait(
-                    lambda: self._board.trip is not None or not busy(),
-                    timeout_s,
-                    "the guarded motion to end",
-                    trips=True,
-                )
-            except BaseException:
-                abort()
-                raise
-            if self._board.trip is not None:
-                abort()
-
         return self._guarded(
-            act,
-            limit_s=timeout_s + 2 * REPLY_S,
+            lambda: self._await(approach),
+            limit_s=approach.timeout_s + 2 * REPLY_S,
             reflex=Reflex.HOLD if retract_ticks is None else Reflex.RETRACT,
             retract_ticks=retract_ticks or self._board.telemetry.pulse_ticks,
         )
+
+    def _await(self, approach: Approach) -> None:
+        """See another motion through; after a contact it is aborted."""
+        try:
+            approach.begin()
+            self._board.wait(
+                lambda: self._board.trip is not None or not approach.busy(),
+                approach.timeout_s,
+                "the guarded motion to end",
+                trips=True,
+            )
+        except BaseException:
+            approach.abort()
+            raise
+        if self._board.trip is not None:
+            approach.abort()
 
     def contact_of(self, trip: Tripped) -> Contact:
         """What a trip's record tells about the contact."""

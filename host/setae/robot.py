@@ -18,13 +18,13 @@ from setae.config import Config
 from setae.contact import Contact
 from setae.controls import Controls
 from setae.errors import InputError
-from setae.guarding import Guarding
+from setae.guarding import Approach, Guarding
 from setae.link.events import Tripped
 from setae.link.session import Session
 from setae.planning import require_one
 from setae.trajectory import FrameTrajectory
 
-__all__ = ["Contact", "Robot"]
+__all__ = ["Approach", "Contact", "Robot"]
 
 
 class Robot(Controls):
@@ -221,6 +221,7 @@ class Robot(Controls):
         speed_mm_s: float | None = None,
         duration_s: float | None = None,
         retract_mm: npt.ArrayLike | None = None,
+        approach: Approach | None = None,
     ) -> Contact | None:
         """Move towards a position until the bristle touches something.
 
@@ -240,6 +241,9 @@ class Robot(Controls):
         retract_mm
             Where the board retracts to after a contact, (3,); None: to where the
             probe started.
+        approach
+            What moves first, with the same baseline: the robot holds meanwhile. Where the
+            bristle touches something then, it is aborted, and the robot does not extend.
 
         Returns
         -------
@@ -264,7 +268,9 @@ class Robot(Controls):
         self._told("probe", position_mm=_list(position_mm), duration_s=duration_s,
                    retract_mm=None if retract_mm is None else _list(retract_mm))  # fmt: skip
         planned = self._planner.line(start, target, duration_s=duration_s)
-        return self._hold_again(self._guarding.extend(planned, retract_ticks=retract))
+        return self._hold_again(
+            self._guarding.extend(planned, retract_ticks=retract, approach=approach)
+        )
 
     def hold_guarded(
         self,
@@ -279,15 +285,8 @@ class Robot(Controls):
 
         Parameters
         ----------
-        begin
-            Called once the bristle watches; starts the other motion.
-        busy
-            True while the other motion lasts.
-        abort
-            Ends the other motion at once: called before anything else is done
-            about a contact, or about whatever else went wrong.
-        timeout_s
-            For the other motion.
+        begin, busy, abort, timeout_s
+            Of the other motion, see `Approach`.
         retract_mm
             Where the board retracts to after a contact, (3,); None: nowhere.
 
@@ -303,8 +302,8 @@ class Robot(Controls):
             retract = self._planner.ticks(self._planner.reach(retract_mm, None))
         self._told("hold_guarded", timeout_s=timeout_s,
                    retract_mm=None if retract_mm is None else _list(retract_mm))  # fmt: skip
-        found = self._guarding.watch(begin, busy, abort, timeout_s=timeout_s, retract_ticks=retract)
-        return self._hold_again(found)
+        approach = Approach(begin=begin, busy=busy, abort=abort, timeout_s=timeout_s)
+        return self._hold_again(self._guarding.watch(approach, retract_ticks=retract))
 
     def contact_of(self, trip: Tripped) -> Contact:
         """What a trip's record tells about the contact."""

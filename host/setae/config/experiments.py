@@ -53,8 +53,8 @@ class Scan(Section):
         Of the rows, see `SCAN_ORDERS`.
     extended_length_mm, retracted_length_mm
         Of the spring, straight; 0: its free length, and its least one.
-    extend_duration_s, retract_duration_s
-        From the one length to the other; shorter ways take less.
+    extend_speed_mm_s, retract_speed_mm_s
+        Of the bristle's tip at its fastest.
     tallest_mm
         How far anything may rise above the extended bristle's tip.
     clearance_mm
@@ -75,8 +75,8 @@ class Scan(Section):
     order: str = key(low=0, high=0, choices=SCAN_ORDERS)
     extended_length_mm: float = key(low=0, high=5000)
     retracted_length_mm: float = key(low=0, high=5000)
-    extend_duration_s: float = key(low=0.02, high=600)
-    retract_duration_s: float = key(low=0.02, high=600)
+    extend_speed_mm_s: float = key(low=0.1, high=5000)
+    retract_speed_mm_s: float = key(low=0.1, high=5000)
     tallest_mm: float = key(low=0, high=5000)
     clearance_mm: float = key(low=1, high=1000)
     contact_depth_mm: float = key(low=-100, high=100)

@@ -74,24 +74,25 @@ class _Tracer:
         run = 1
         while run < len(left) and abs(left[run] - left[run - 1]) == 1:
             run += 1
-        begin_mm = self._steps.position_mm[0]
-        end = left[run - 1]
-        contact = self._steps.go(self._survey.x_mm(end), self._survey.y_mm(row))
-        if contact is None:
-            passed = run
-        else:
-            here_mm = self._steps.position_mm[0]
-            forward = self._survey.x_mm(end) >= begin_mm
-            passed = sum(
-                self._survey.x_mm(column) < here_mm - self._settings.clearance_mm
-                if forward
-                else self._survey.x_mm(column) > here_mm + self._settings.clearance_mm
-                for column in left[:run]
-            )
+        passed = 0
+        for end in (0, run - 1):
+            contact = self._steps.go(self._survey.x_mm(left[end]), self._survey.y_mm(row))
+            passed = end + 1 if contact is None else self._passed(left[:end])
+            if contact is not None:
+                break
         for column in left[:passed]:
             self._found((column, row), NOTHING)
         left = left[passed:]
         return left if contact is None else self._touch(left, row, beside=True)
+
+    def _passed(self, run: Sequence[int]) -> int:
+        """How many places of a row the arm left well behind before it was stopped."""
+        if not run:
+            return 0
+        here_mm = self._steps.position_mm[0]
+        begin_mm = self._survey.x_mm(run[0])
+        way_mm = abs(here_mm - begin_mm) - self._settings.clearance_mm
+        return sum(abs(self._survey.x_mm(column) - begin_mm) < way_mm for column in run)
 
     def _touch(self, left: list[int], row: int, *, beside: bool = False) -> list[int]:
         """Feel at the next place, and where it may be so, at the next but one; what is left."""
@@ -131,23 +132,23 @@ class _Tracer:
 
     def _visit(self, cell: Cell) -> Feeling:
         """Go there no lower than is safe, and feel."""
-        self._go_over(cell)
-        feeling = self._steps.feel()
-        if feeling.mark == "double":
-            # In touch at once: from farther up it is seen whether it is so.
-            self._steps.retract()
-            feeling = self._steps.feel()
-        return feeling
-
-    def _go_over(self, cell: Cell) -> None:
-        x_mm, y_mm = self._survey.x_mm(cell[0]), self._survey.y_mm(cell[1])
+        steps = self._steps
+        place_mm = self._survey.x_mm(cell[0]), self._survey.y_mm(cell[1])
         top_mm = self._top_mm(cell)
         if math.isfinite(top_mm):
-            length_mm = self._steps.length_over_mm(top_mm)
-            if length_mm < self._steps.length_mm:
-                self._steps.retract(length_mm)
-        if self._steps.go(x_mm, y_mm) is not None:
-            self._steps.go(x_mm, y_mm)
+            steps.retract(steps.length_over_mm(top_mm))
+        feeling = None if steps.extended else steps.go_and_feel(*place_mm)
+        if feeling is None:
+            steps.retract()
+            feeling = steps.go_and_feel(*place_mm)
+            assert feeling is not None, "a short robot that touches something raises"
+        if feeling.mark == "double":
+            # In touch at once: from farther up it is seen whether it is so.
+            steps.retract()
+            feeling = steps.feel()
+        if feeling.contact is not None:
+            steps.lower(steps.length_over_mm(feeling.height_mm))
+        return feeling
 
     def _known_above(self, column: int, row: int) -> bool:
         """Whether something is known to stand between the arm and a place, or on it."""

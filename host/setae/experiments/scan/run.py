@@ -17,7 +17,7 @@ from setae.config import Config, Scan
 from setae.errors import InputError, SetaeError
 from setae.experiments.events import OnEvent
 from setae.experiments.scan import adaptive, cycles
-from setae.experiments.scan.steps import Feeling, Steps, require_window
+from setae.experiments.scan.steps import Feeling, Steps, contact_data, require_window
 from setae.experiments.scan.survey import Cell, Place, Survey
 from setae.heightmap import HeightMap
 from setae.objects import TableScene
@@ -168,7 +168,7 @@ def _run(
         )
         places.append(place)
         steps.emit("place", **place.data(), known=survey.known, total=len(survey),
-                   contact=None if contact is None else _contact_data(feeling))  # fmt: skip
+                   contact=contact and contact_data(contact))  # fmt: skip
 
     steps.emit(
         "scan_start",
@@ -207,18 +207,6 @@ def _run(
         complete=survey.known == len(survey),
         scene=scene,
     )
-
-
-def _contact_data(feeling: Feeling) -> dict[str, Any]:
-    contact = feeling.contact
-    assert contact is not None
-    return {
-        "time_us": contact.time_us,
-        "tip_mm": list(contact.tip_mm),
-        "uncertainty_mm": contact.uncertainty_mm,
-        "pressure_hpa": contact.pressure_hpa,
-        "baseline_hpa": contact.baseline_hpa,
-    }
 
 
 # ------------------------------------------------------------------------- simulated

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ from setae.errors import HeightWindowError
 from setae.experiments.events import Event, OnEvent
 from setae.link.events import Event as LinkEvent
 from setae.link.events import TelemetryReceived
-from setae.robot import Robot
+from setae.robot import Approach, Robot
 from setae.stage import Stage, move_timeout_s
 from setae_protocol.messages import PRESSURE_LSB_PER_HPA, Guard
 
@@ -23,6 +24,7 @@ _AT_ONCE_MM = 1.5
 _HERE_MM = 0.02
 # Shorter differences of length are not worth a move of the spring.
 _SAME_LENGTH_MM = 0.3
+_WORTH_LOWERING_MM = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,6 +148,11 @@ class Steps:
         """Whether the spring has its full length."""
         return self.length_mm > self.long_mm - _SAME_LENGTH_MM
 
+    @property
+    def short(self) -> bool:
+        """Whether the spring is as short as it gets in the scan."""
+        return self.length_mm - self.short_mm < _SAME_LENGTH_MM
+
     def length_over_mm(self, height_mm: float) -> float:
         """Longest spring whose tip clears a height of the world, within what the scan may take."""
         offset_mm = self._robot.config.geometry.tip_offset_mm + self._settings.clearance_mm
@@ -159,8 +166,13 @@ class Steps:
         target_mm = self.short_mm if length_mm is None else length_mm
         way_mm = self.length_mm - target_mm
         if way_mm > _SAME_LENGTH_MM:
-            duration_s = self._duration_s(way_mm, self._settings.retract_duration_s)
-            self._robot.compress(target_mm, duration_s=duration_s)
+            self._robot.compress(target_mm, speed_mm_s=self._settings.retract_speed_mm_s)
+
+    def lower(self, length_mm: float) -> None:
+        """Extend to a length that is known to be free, where that saves more than it takes."""
+        way_mm = length_mm - self.length_mm
+        if way_mm > _WORTH_LOWERING_MM:
+            self._robot.compress(length_mm, speed_mm_s=self._settings.retract_speed_mm_s)
 
     def go(self, x_mm: float, y_mm: float) -> Contact | None:
         """Take the arm to a place with the bristle watching.
@@ -172,42 +184,18 @@ class Steps:
         HeightWindowError
             The robot is short already: what it touched is too high to be stepped over.
         """
-        now_mm, origin_mm = self.position_mm, self._origin_mm
-        if math.dist(now_mm[:2], (x_mm, y_mm)) < _HERE_MM:
+        if self._is_here(x_mm, y_mm):
             return None
-        target_mm = (origin_mm[0] + x_mm, origin_mm[1] + y_mm, origin_mm[2])
-        short = self.length_mm - self.short_mm < _SAME_LENGTH_MM
-        self.emit("step", target_mm=[x_mm, y_mm], length_mm=round(self.length_mm, 3))
+        approach = self._approach(x_mm, y_mm)
         contact = self._robot.hold_guarded(
-            begin=lambda: self._stage.move_to(target_mm),
-            busy=lambda: self._stage.moving,
-            abort=self._stage.stop,
-            timeout_s=self._arm_timeout_s(target_mm),
-            retract_mm=None if short else (0.0, 0.0, self.short_mm),
+            approach.begin,
+            approach.busy,
+            approach.abort,
+            timeout_s=approach.timeout_s,
+            retract_mm=None if self.short else (0.0, 0.0, self.short_mm),
         )
-        if contact is None:
-            return None
-        self._robot.wait(
-            lambda: not self._stage.moving,
-            timeout_s=self._arm_timeout_s(target_mm),
-            what="the arm to come to rest",
-        )
-        place_mm = self.position_mm
-        self.emit(
-            "step_contact",
-            position_mm=list(place_mm),
-            contact={
-                "time_us": contact.time_us,
-                "pressure_hpa": contact.pressure_hpa,
-                "baseline_hpa": contact.baseline_hpa,
-            },
-        )
-        if short:
-            raise HeightWindowError(
-                f"The retracted bristle touched something {place_mm[0]:.0f}, {place_mm[1]:.0f} mm "
-                "from the first place: it can't be stepped over.",
-                "Raise the arm's start, and scan anew.",
-            )
+        if contact is not None:
+            self._stopped(contact)
         return contact
 
     def feel(self) -> Feeling:
@@ -215,10 +203,41 @@ class Steps:
 
         After a contact the robot is as long as before, otherwise extended.
         """
+        return self._feel(None)
+
+    def go_and_feel(self, x_mm: float, y_mm: float) -> Feeling | None:
+        """`go` and `feel` under one watch, which saves a baseline.
+
+        Returns
+        -------
+        Feeling or None
+            None after a contact on the way: arm and robot stay where they were then.
+        """
+        if self._is_here(x_mm, y_mm):
+            return self._feel(None)
+        aborted = False
+        approach = self._approach(x_mm, y_mm)
+
+        def abort() -> None:
+            nonlocal aborted
+            aborted = True
+            approach.abort()
+
+        feeling = self._feel(dataclasses.replace(approach, abort=abort))
+        if not aborted:
+            return feeling
+        assert feeling.contact is not None, "an approach ends early by a contact"
+        self._stopped(feeling.contact)
+        return None
+
+    def _feel(self, approach: Approach | None) -> Feeling:
         begin_mm = self.length_mm
-        duration_s = self._duration_s(self.long_mm - begin_mm, self._settings.extend_duration_s)
         self._watch.begin()
-        contact = self._robot.probe((0.0, 0.0, self.long_mm), duration_s=duration_s)
+        contact = self._robot.probe(
+            (0.0, 0.0, self.long_mm),
+            speed_mm_s=self._settings.extend_speed_mm_s,
+            approach=approach,
+        )
         slipped = self._watch.fell_hpa() > self._settings.slip_hpa
         if contact is None:
             return Feeling(mark="lost" if slipped else "empty", height_mm=math.nan, contact=None)
@@ -229,6 +248,39 @@ class Steps:
         elif slipped:
             mark = "slipped"
         return Feeling(mark=mark, height_mm=self.position_mm[2] - tip_mm, contact=contact)
+
+    def _is_here(self, x_mm: float, y_mm: float) -> bool:
+        return math.dist(self.position_mm[:2], (x_mm, y_mm)) < _HERE_MM
+
+    def _approach(self, x_mm: float, y_mm: float) -> Approach:
+        origin_mm = self._origin_mm
+        target_mm = (origin_mm[0] + x_mm, origin_mm[1] + y_mm, origin_mm[2])
+        self.emit("step", target_mm=[x_mm, y_mm], length_mm=round(self.length_mm, 3))
+        return Approach(
+            begin=lambda: self._stage.move_to(target_mm),
+            busy=lambda: self._stage.moving,
+            abort=self._stage.stop,
+            timeout_s=self._arm_timeout_s(target_mm),
+        )
+
+    def _stopped(self, contact: Contact) -> None:
+        """After a contact in a step: wait for the arm, tell of it."""
+        self._robot.wait(
+            lambda: not self._stage.moving,
+            timeout_s=self._arm_timeout_s(self._stage.position_mm),
+            what="the arm to come to rest",
+        )
+        place_mm = self.position_mm
+        self.emit("step_contact", position_mm=list(place_mm), contact=contact_data(contact))
+        if self._short_at_contact(contact):
+            raise HeightWindowError(
+                f"The retracted bristle touched something {place_mm[0]:.0f}, {place_mm[1]:.0f} mm "
+                "from the first place: it can't be stepped over.",
+                "Raise the arm's start, and scan anew.",
+            )
+
+    def _short_at_contact(self, contact: Contact) -> bool:
+        return contact.position_mm[2] - self.short_mm < _SAME_LENGTH_MM
 
     def stop(self, error: BaseException) -> None:
         """Stop arm and robot. Their own failures must not hide what went wrong first."""
@@ -242,9 +294,6 @@ class Steps:
         """Tell of something that happened."""
         if self._on_event is not None:
             self._on_event(Event(time_us=self.now_us, name=name, data=data))
-
-    def _duration_s(self, way_mm: float, whole_s: float) -> float:
-        return max(0.1, whole_s * way_mm / (self.long_mm - self.short_mm))
 
     def _arm_timeout_s(self, target_mm: tuple[float, float, float]) -> float:
         if self._fixed_arm_timeout_s is not None:
@@ -277,3 +326,14 @@ class _PressureWatch:
             change_hpa = abs(sample.pressure_raw - telemetry.baseline_raw) / PRESSURE_LSB_PER_HPA
             self._highest_hpa = max(self._highest_hpa, change_hpa)
             self._fell_hpa = max(self._fell_hpa, self._highest_hpa - change_hpa)
+
+
+def contact_data(contact: Contact) -> dict[str, Any]:
+    """Of a contact, for a log; JSON-ready."""
+    return {
+        "time_us": contact.time_us,
+        "tip_mm": list(contact.tip_mm),
+        "uncertainty_mm": contact.uncertainty_mm,
+        "pressure_hpa": contact.pressure_hpa,
+        "baseline_hpa": contact.baseline_hpa,
+    }
