@@ -1,6 +1,8 @@
-// The bristle: a filament in silicone on a pressure sensor.
+// The bristle: a filament in silicone gel on a pressure sensor.
 #pragma once
 
+#include "environment.h"
+#include "filament.h"
 #include "geometry.h"
 #include "random.h"
 
@@ -8,9 +10,10 @@ namespace setae {
 namespace sim {
 
 struct BristleSettings {
-  double contact_hpa_per_mm;
-  double contact_saturation_hpa;  // a deeper contact slips off
-  double relaxation_fraction;     // of a held contact's pressure, lost in time
+  FilamentSettings filament;
+  double pressure_hpa_per_n;     // by what pushes the filament into the gel
+  double pressure_hpa_per_n_mm;  // by what turns it in there
+  double relaxation_fraction;    // of a held contact's pressure, lost in time
   double relaxation_time_s;
   double motion_axial_hpa_s2_per_mm;
   double motion_lateral_hpa_s2_per_mm;
@@ -24,20 +27,21 @@ class Bristle {
  public:
   Bristle(const BristleSettings& settings, uint64_t seed);
 
-  // Where the filament's root starts, at rest.
-  void place(const Vec3& root_mm);
+  // Where the filament's root starts, at rest; axes.ez points along the filament.
+  void place(const Vec3& root_mm, const Mat3& axes);
 
-  // Pressure change at the end of a step: the root has moved to `root_mm`,
-  // `axis` points along the filament, `depth_mm` is the contact's depth.
-  void step(double duration_s, const Vec3& root_mm, const Vec3& axis, double depth_mm);
+  // Pressure change at the end of a step that moved the root there, among solids.
+  void step(double duration_s, const Vec3& root_mm, const Mat3& axes,
+            const Environment& environment);
 
   // Against the ambient pressure.
   double pressure_hpa() const { return contact_hpa_ + motion_hpa_ + drift_hpa_ + noise_hpa_; }
   double motion_hpa() const { return motion_hpa_; }
-  double contact_hpa() const { return contact_hpa_; }
+  const Filament& filament() const { return filament_; }
 
  private:
   BristleSettings settings_;
+  Filament filament_;
   Random noise_;
   Random drift_;
   Vec3 root_mm_{};

@@ -12,6 +12,11 @@ constexpr int kFilamentPoints = 16;  // 3.5 mm apart on a filament of 53 mm
 constexpr double kMarchMm = 0.25;    // thinner than any wall
 constexpr int kHalvings = 20;
 
+// Depth in both of two solids. Outside of both, the way to the edge where they meet.
+double in_both(double a, double b) {
+  return a < 0 && b < 0 ? -std::hypot(a, b) : std::min(a, b);
+}
+
 }  // namespace
 
 void Environment::add_tube(const Vec3& axis_point_mm, double inner_radius_mm) {
@@ -48,11 +53,11 @@ double Environment::depth(const Prism& prism, const Vec3& point_mm) {
   const double y = std::fabs(p.y) - prism.half_edges.y + prism.corner;
   const double beside =
       std::hypot(std::max(x, 0.0), std::max(y, 0.0)) + std::min(std::max(x, y), 0.0) - prism.corner;
-  const double solid = std::min(-beside, prism.half_edges.z - std::fabs(p.z));
+  const double solid = in_both(-beside, prism.half_edges.z - std::fabs(p.z));
   if (prism.wall == 0)
     return solid;
   const double cavity = std::min(-beside - prism.wall, p.z + prism.half_edges.z - prism.wall);
-  return std::min(solid, -cavity);
+  return in_both(solid, -cavity);
 }
 
 double Environment::depth(const Ring& ring, const Vec3& point_mm) {

@@ -25,7 +25,10 @@ struct Parameters {
   } servo;
   struct Bristle {
     double tip_offset_mm, filament_length_mm;
-    double contact_hpa_per_mm, contact_saturation_hpa, relaxation_fraction, relaxation_time_s;
+    double filament_diameter_mm, filament_modulus_n_per_mm2, filament_bow_mm,
+        filament_bow_angle_deg;
+    double gel_stiffness_n_per_mm, gel_rotation_n_mm_per_rad, friction;
+    double pressure_hpa_per_n, pressure_hpa_per_n_mm, relaxation_fraction, relaxation_time_s;
     double motion_axial_hpa_s2_per_mm, motion_lateral_hpa_s2_per_mm;
     double natural_frequency_hz, damping_ratio;
   } bristle;

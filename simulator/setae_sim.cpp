@@ -431,6 +431,7 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
     write(truth.tip_mm, out->filament_mm[1]);
     out->contact_depth_mm = truth.contact.depth_mm;
     write(truth.contact.point_mm, out->contact_point_mm);
+    write(truth.bent_tip_mm, out->bent_tip_mm);
     out->pressure_hpa = w.pressure_hpa();
     out->plant_residual = w.foreign() ? 0 : plant.residual();
     return 0;

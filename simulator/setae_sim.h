@@ -35,6 +35,7 @@ typedef struct {
   double filament_mm[2][3];                     /* frame D: root and undeformed tip E */
   double contact_depth_mm;                      /* deepest penetration of the undeformed filament */
   double contact_point_mm[3]; /* where, in the world; valid if contact_depth_mm > 0 */
+  double bent_tip_mm[3];      /* the filament's tip at the sensor's last sample, in the world */
   double pressure_hpa;        /* true pressure at the sensor, noise included */
   double plant_residual;      /* scaled gradient norm of the last equilibrium */
 } setae_truth;

@@ -74,8 +74,18 @@ ServoSettings servo_settings(const Parameters& p, int i) {
 
 BristleSettings bristle_settings(const Parameters& p) {
   BristleSettings s{};
-  s.contact_hpa_per_mm = p.bristle.contact_hpa_per_mm;
-  s.contact_saturation_hpa = p.bristle.contact_saturation_hpa;
+  FilamentSettings& f = s.filament;
+  f.length_mm = p.bristle.filament_length_mm;
+  f.diameter_mm = p.bristle.filament_diameter_mm;
+  f.modulus_n_per_mm2 = p.bristle.filament_modulus_n_per_mm2;
+  f.bow_mm = p.bristle.filament_bow_mm;
+  f.bow_rad = kDegree * p.bristle.filament_bow_angle_deg;
+  f.gel_stiffness_n_per_mm = p.bristle.gel_stiffness_n_per_mm;
+  f.gel_rotation_n_mm_per_rad = p.bristle.gel_rotation_n_mm_per_rad;
+  f.friction = p.bristle.friction;
+  f.settling_s = 2 * p.bristle.damping_ratio / (360 * kDegree * p.bristle.natural_frequency_hz);
+  s.pressure_hpa_per_n = p.bristle.pressure_hpa_per_n;
+  s.pressure_hpa_per_n_mm = p.bristle.pressure_hpa_per_n_mm;
   s.relaxation_fraction = p.bristle.relaxation_fraction;
   s.relaxation_time_s = p.bristle.relaxation_time_s;
   s.motion_axial_hpa_s2_per_mm = p.bristle.motion_axial_hpa_s2_per_mm;
@@ -122,9 +132,8 @@ World::World(const Parameters& parameters, const Environment& environment, uint6
       next_sample_us_(sample_time_us(parameters, 1)) {
   arm_.place(arm_mm);
   ask_foreign();
-  Vec3 root_mm, tip_mm;
-  filament(top(body_), root_mm, tip_mm);
-  bristle_.place(in_world(root_mm));
+  const Top start = top(body_);
+  bristle_.place(in_world(root_mm(start)), in_world(start.rotation));
   if (parameters.board.pose_known == 0)
     hal_.forget_pose();
   boot();
@@ -289,12 +298,8 @@ bool World::sample() {
   ask_foreign();
   unsolved_ = outcome() == Outcome::kFine ? 0 : unsolved_ + 1;
   const Top now = top(body_);
-  Vec3 root_mm, tip_mm;
-  filament(now, root_mm, tip_mm);
-  const Vec3 root = in_world(root_mm), tip = in_world(tip_mm);
-  const Contact contact = environment_.deepest(root, tip);
-  bristle_.step(1e-6 * static_cast<double>(duration_us), root, flip(now.rotation.ez),
-                contact.depth_mm);
+  bristle_.step(1e-6 * static_cast<double>(duration_us), in_world(root_mm(now)),
+                in_world(now.rotation), environment_);
   last_sample_us_ = now_us_;
   ++samples_;
   next_sample_us_ = sample_time_us(parameters_, samples_ + 1);
@@ -394,18 +399,17 @@ Top World::top(const Body& body) const {
   return {shape.position[shape.elements], shape.rotation[shape.elements], body.plant.tension_n()};
 }
 
-void World::filament(const Top& top, Vec3& root_mm, Vec3& tip_mm) const {
-  const double tip_offset_mm = parameters_.bristle.tip_offset_mm;
-  root_mm =
-      top.position_mm + (tip_offset_mm - parameters_.bristle.filament_length_mm) * top.rotation.ez;
-  tip_mm = top.position_mm + tip_offset_mm * top.rotation.ez;
+Vec3 World::root_mm(const Top& top) const {
+  const Parameters::Bristle& bristle = parameters_.bristle;
+  return top.position_mm + (bristle.tip_offset_mm - bristle.filament_length_mm) * top.rotation.ez;
 }
 
 Truth World::truth() const {
-  Truth truth{body_, {}, {}, {}, {}};
+  Truth truth{body_, {}, {}, {}, {}, bristle_.filament().tip_mm()};
   move(truth.body, now_us_ - last_sample_us_);
   truth.top = top(truth.body);
-  filament(truth.top, truth.root_mm, truth.tip_mm);
+  truth.root_mm = root_mm(truth.top);
+  truth.tip_mm = truth.root_mm + parameters_.bristle.filament_length_mm * truth.top.rotation.ez;
   truth.contact = environment_.deepest(in_world(truth.root_mm), in_world(truth.tip_mm));
   return truth;
 }

@@ -58,8 +58,9 @@ enum class Outcome { kFine, kNoSolution, kForeignFailed };
 struct Truth {
   Body body;
   Top top;
-  Vec3 root_mm, tip_mm;  // of the filament, frame D
-  Contact contact;       // in the world
+  Vec3 root_mm, tip_mm;  // of the undeformed filament, frame D
+  Contact contact;       // of that, in the world
+  Vec3 bent_tip_mm;      // of the filament at the last sample, in the world
 };
 
 class World {
@@ -117,8 +118,9 @@ class World {
   void transmit();
   void ask_foreign();
   Top top(const Body& body) const;
-  void filament(const Top& top, Vec3& root_mm, Vec3& tip_mm) const;
+  Vec3 root_mm(const Top& top) const;  // of the filament
   Vec3 in_world(const Vec3& point_mm) const { return arm_.position_mm(now_us_) + flip(point_mm); }
+  static Mat3 in_world(const Mat3& axes) { return {flip(axes.ex), flip(axes.ey), flip(axes.ez)}; }
 
   const Parameters parameters_;
   const Environment environment_;

@@ -66,6 +66,7 @@ class CTruth(ctypes.Structure):
         ("filament_mm", c_double * 3 * 2),
         ("contact_depth_mm", c_double),
         ("contact_point_mm", c_double * 3),
+        ("bent_tip_mm", c_double * 3),
         ("pressure_hpa", c_double),
         ("plant_residual", c_double),
     )

@@ -68,6 +68,8 @@ class Truth:
         Deepest penetration of the undeformed filament; 0 without contact.
     contact_point_mm
         Where that is in the world, (3,); None without contact.
+    bent_tip_mm
+        The filament's tip at the sensor's last sample, bent as it is, in the world, (3,).
     pressure_hpa
         Pressure at the sensor's last sample, noise included.
     plant_residual
@@ -87,6 +89,7 @@ class Truth:
     filament_mm: Array
     contact_depth_mm: float
     contact_point_mm: Array | None
+    bent_tip_mm: Array
     pressure_hpa: float
     plant_residual: float
 
@@ -379,6 +382,7 @@ class World:
             filament_mm=now["filament_mm"],
             contact_depth_mm=depth_mm,
             contact_point_mm=now["contact_point_mm"] if depth_mm > 0 else None,
+            bent_tip_mm=now["bent_tip_mm"],
             pressure_hpa=raw.pressure_hpa,
             plant_residual=raw.plant_residual,
         )
