@@ -21,7 +21,11 @@ NATIVE_SOURCES := CMakeLists.txt $(shell find firmware/lib simulator -name '*.cp
 # The simulated UNO, for tests only: simavr is GPL, and nothing of it is shipped.
 AVR_LIBRARY := build/avr/libuno.so
 AVR_SOURCES := $(wildcard tests/avr/shim/*.cpp tests/avr/shim/*.h)
-AVR_PACKAGES := libsimavr-dev libelf-dev
+AVR_PACKAGES := libsimavr-dev libelf-dev avrdude arduino-core-avr
+# The UNO's own bootloader, from the source in Debian's package: the hex file beside it is too long for
+# its section, and hangs.
+BOOTLOADER := build/avr/optiboot.bin
+BOOTLOADER_SOURCE := /usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c
 # The model checker; it compiles what it makes.
 MODEL_PACKAGES := spin gcc
 FUZZ_PACKAGES := clang libclang-rt-dev
@@ -84,6 +88,8 @@ demo: .venv/.installed ## run the exploration of the tube in the simulator, and 
 flash: ## build the firmware and write it to the UNO (PORT=/dev/ttyACM0, or found)
 	@.ci/need python
 	$(PIO) run -e uno --target upload $(if $(PORT),--upload-port $(PORT))
+	@if [ -x $(BIN)/setae ]; then $(BIN)/setae info $(if $(PORT),--port $(PORT)); \
+	else echo 'setae: after make build, .venv/bin/setae info shows the version'; fi
 
 .PHONY: bench
 bench: .venv/.dev firmware $(AVR_LIBRARY) ## measure, into bench/results.json
@@ -151,7 +157,7 @@ model: .venv/.dev ## check the model of link and states whole, and count its sta
 	$(BIN)/python -m tests.model.checker
 
 .PHONY: pytest
-pytest: .venv/.dev firmware $(AVR_LIBRARY) ## the Python tests
+pytest: .venv/.dev firmware $(AVR_LIBRARY) $(BOOTLOADER) ## the Python tests
 	@.ci/need $(MODEL_PACKAGES) $(FUZZ_PACKAGES)
 	$(BIN)/python -m pytest
 
@@ -168,7 +174,7 @@ line-stress: .venv/.dev ## a million commands over a bad line, noted in tests/sy
 	$(BIN)/python -m tests.system.link_stress --commands 1000000 --record
 
 .PHONY: avr
-avr: .venv/.dev firmware $(AVR_LIBRARY) ## the built firmware's tests, in a cycle-accurate UNO
+avr: .venv/.dev firmware $(AVR_LIBRARY) $(BOOTLOADER) ## the built firmware's tests, in a cycle-accurate UNO
 	$(BIN)/python -m pytest tests/avr
 
 $(AVR_LIBRARY): $(AVR_SOURCES)
@@ -177,6 +183,18 @@ $(AVR_LIBRARY): $(AVR_SOURCES)
 	@mkdir -p $(@D)
 	@$(CXX) -std=c++14 -O2 -Wall -Wextra -Werror -shared -fPIC -isystem /usr/include/simavr \
 	  -o $@ $(filter %.cpp,$^) -lsimavr -lelf
+
+$(BOOTLOADER): Makefile
+	@.ci/need $(AVR_PACKAGES)
+	@echo 'setae: compiling the bootloader for the simulated UNO'
+	@mkdir -p $(@D)
+	@avr-gcc -Os -fno-inline-functions-called-once -fno-inline-small-functions -mmcu=atmega328p \
+	  -DF_CPU=16000000L -DBAUD_RATE=115200 -DLED_START_FLASHES=3 -nostartfiles -nostdlib -w \
+	  -Wl,--relax,--section-start=.text=0x7e00,--section-start=.version=0x7ffe \
+	  -o $(@:.bin=.elf) $(BOOTLOADER_SOURCE)
+	@avr-objcopy -O binary --gap-fill 0xff --set-section-flags .version=alloc,load \
+	  $(@:.bin=.elf) $@
+	@test $$(wc -c <$@) = 512 # it has to end where the flash does
 
 .PHONY: format
 format: .venv/.dev ## put all sources into the project's style

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.avr.simavr import FIRMWARE, LIBRARY, ROOT
+from tests.avr.simavr import BOOTLOADER, FIRMWARE, LIBRARY, ROOT
 
 _SUFFIXES = (".c", ".cpp", ".h", ".ini")
 
@@ -13,6 +13,7 @@ _SUFFIXES = (".c", ".cpp", ".h", ".ini")
 def require_built() -> None:
     """Fail where something is missing or old: nothing is skipped."""
     _require(LIBRARY, [ROOT / "tests" / "avr" / "shim"])
+    _require(BOOTLOADER, [])
     _require(
         FIRMWARE,
         [

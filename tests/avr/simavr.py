@@ -21,6 +21,8 @@ from setae_protocol.messages import (
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "build" / "avr" / "libuno.so"
 FIRMWARE = ROOT / ".pio" / "build" / "uno" / "firmware.elf"
+BOOTLOADER = ROOT / "build" / "avr" / "optiboot.bin"
+BOOT_START = 0x7E00
 
 CYCLES_PER_US = 16
 CYCLES_PER_TICK = CYCLES_PER_US // PULSE_TICKS_PER_US
@@ -149,6 +151,7 @@ def _load() -> ctypes.CDLL:
         "uno_supply": (None, [handle, ctypes.c_double]),
         "uno_bandgap": (None, [handle, ctypes.c_double]),
         "uno_load": (None, [handle, ctypes.c_uint16, ctypes.c_char_p, size]),
+        "uno_flash_get": (ctypes.c_uint8, [handle, ctypes.c_uint16]),
         "uno_start": (None, [handle, ctypes.c_uint16]),
         "uno_eeprom_get": (ctypes.c_uint8, [handle, ctypes.c_uint16]),
         "uno_eeprom_set": (None, [handle, ctypes.c_uint16, ctypes.c_uint8]),
@@ -263,8 +266,17 @@ class Uno:
     # --------------------------------------------------------------------------- memory
 
     def load(self, address: int, data: bytes) -> None:
-        """Put bytes into the flash."""
+        """Put bytes into the flash, as a programmer does."""
         self._library.uno_load(self._handle, address, data, len(data))
+
+    def flash(self, address: int, size: int) -> bytes:
+        """Return what the flash holds."""
+        return bytes(self._library.uno_flash_get(self._handle, address + i) for i in range(size))
+
+    def install_bootloader(self) -> None:
+        """Put the UNO's bootloader where the fuses have it, and start there."""
+        self.load(BOOT_START, BOOTLOADER.read_bytes())
+        self.set_start(BOOT_START)
 
     def set_start(self, address: int) -> None:
         """Start there now and after each reset, as the fuses tell a chip with a bootloader."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from setae import rig
 from setae.cli.common import app, console
-from setae.errors import SetaeError
+from setae.errors import PortNotFoundError, SetaeError
 
 # Where PlatformIO leaves what it has built, below the folder of platformio.ini.
 _HEX = Path(".pio") / "build" / "uno" / "firmware.hex"
@@ -33,7 +33,7 @@ def flash(*, port: str | None = None, hex_file: Path | None = None) -> None:
         A built firmware to upload with avrdude, instead of building one.
     """
     tool, folder = _tool(hex_file)
-    port = port or rig.find_port()
+    port = _port(port)
     command = [part.replace("{port}", port) for part in tool]
     console.print(f"Running: {' '.join(command)}", markup=False, soft_wrap=True)
     try:
@@ -45,7 +45,8 @@ def flash(*, port: str | None = None, hex_file: Path | None = None) -> None:
     if done.returncode != 0:
         raise SetaeError(
             f"{command[0]} failed with exit code {done.returncode}.",
-            "Its own output above says why. Correct that, then run it again.",
+            "Its own output above says why. Where it says `not in sync`, "
+            f"no UNO answered on {port}.",
         )
     with rig.connect(port) as robot:
         console.print(f"The board answers: firmware {robot.firmware_version}.")
@@ -78,6 +79,24 @@ def _tool(hex_file: Path | None) -> tuple[list[str], Path | None]:
             "Install it (Debian: apt install avrdude), or PlatformIO (pip install platformio).",
         )
     return [avrdude, *_AVRDUDE, "-P", "{port}", "-U", f"flash:w:{hex_file}:i"], None
+
+
+def _port(port: str | None) -> str:
+    """The port, if it is there: building takes a minute, and avrdude's words are long."""
+    if port is None:
+        try:
+            return rig.find_port()
+        except PortNotFoundError as error:
+            raise PortNotFoundError(
+                error.problem, "Plug the board in, or name its port: setae flash --port PORT."
+            ) from error
+    there = [found.device for found in rig.ports()]
+    if port not in there and not Path(port).exists():
+        raise PortNotFoundError(
+            f"There is no port {port}; ports here: {', '.join(there) or 'none at all'}.",
+            "Plug the board in, or name another port.",
+        )
+    return port
 
 
 def _which(tool: str) -> str | None:

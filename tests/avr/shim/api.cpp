@@ -79,6 +79,10 @@ void uno_load(Uno* uno, uint16_t address, const uint8_t* data, size_t size) {
   uno->load(address, data, size);
 }
 
+uint8_t uno_flash_get(Uno* uno, uint16_t address) {
+  return uno->chip().avr()->flash[address];
+}
+
 void uno_start(Uno* uno, uint16_t address) {
   uno->set_start(address);
 }

@@ -12,6 +12,7 @@ namespace {
 
 constexpr uint8_t kHoldAll = 0x80;  // TSM
 constexpr uint8_t kWaveformBitsA = 0x03;
+constexpr uint8_t kOverflow = 1 << 0;  // TOV
 
 }  // namespace
 
@@ -55,6 +56,7 @@ Timer::Timer(Chip& chip, const Kind& kind, OnOutput on_output)
   read_write_16(
       kind_.tcnt, [this] { return count(chip_.cycle()); },
       [this](uint32_t value) {
+        overflowed_ = overflowed();
         rebase(chip_.cycle(), value);
         // Section 16.7.2: writing the counter suppresses a match at the next clock.
         schedule_all(true);
@@ -69,7 +71,17 @@ Timer::Timer(Chip& chip, const Kind& kind, OnOutput on_output)
         },
         false);
   }
+  // Section 16.9.1: set as the counter becomes 0; looked for when it is read, as no interrupt is
+  // made of it here.
+  chip_.on_read(kind_.tifr, [this] {
+    const uint8_t others = chip_.get(kind_.tifr) & static_cast<uint8_t>(~kOverflow);
+    return static_cast<uint8_t>(others | (overflowed() ? kOverflow : 0));
+  });
   chip_.on_write(kind_.tifr, [this](uint8_t value) {
+    if (value & kOverflow) {
+      overflowed_ = false;
+      wraps_cleared_ = wraps(chip_.cycle());
+    }
     for (avr_int_vector_t* vector : vectors_) {
       if ((value >> vector->raised.bit) & 1) {
         avr_clear_interrupt(chip_.avr(), vector);
@@ -124,6 +136,8 @@ void Timer::reset() {
   normal_ = true;
   base_count_ = 0;
   base_tick_ = 0;
+  wraps_cleared_ = 0;
+  overflowed_ = false;
   temp_ = 0;
 }
 
@@ -131,6 +145,10 @@ uint32_t Timer::count(Cycle when) const {
   if (!running())
     return base_count_;
   return static_cast<uint32_t>(base_count_ + (tick(when) - base_tick_)) % kind_.modulus;
+}
+
+uint64_t Timer::wraps(Cycle when) const {
+  return running() ? (base_count_ + (tick(when) - base_tick_)) / kind_.modulus : 0;
 }
 
 Cycle Timer::was_at(uint32_t value) const {
@@ -141,6 +159,7 @@ Cycle Timer::was_at(uint32_t value) const {
 
 void Timer::rebase(Cycle when, uint32_t count) {
   base_count_ = count;
+  wraps_cleared_ = 0;
   base_tick_ = shift_ == kStopped ? 0 : tick(when);
 }
 
@@ -199,6 +218,7 @@ void Timer::act(int unit, Cycle when) {
 void Timer::on_control(uint16_t address, uint8_t value) {
   const Cycle now = chip_.cycle();
   const uint32_t reached = count(now);
+  overflowed_ = overflowed();
   uint8_t forced = 0;
   if (address == kind_.force) {
     forced = value & 0xC0;  // strobes: they read as 0
@@ -228,6 +248,7 @@ void Timer::on_control(uint16_t address, uint8_t value) {
 void Timer::hold(uint8_t gtccr) {
   const Cycle now = chip_.cycle();
   const uint32_t reached = count(now);
+  overflowed_ = overflowed();
   const bool hold_now = (gtccr & kHoldAll) && (gtccr & kind_.hold);
   if (held_ && !hold_now) {
     held_ = false;

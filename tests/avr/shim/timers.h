@@ -52,7 +52,10 @@ class Timer {
   bool running() const { return shift_ != kStopped && !held_ && normal_; }
   uint64_t tick(Cycle when) const { return (when - origin_) >> shift_; }
   uint32_t count(Cycle when) const;
+  // How often the counter has passed its top since it was last set.
+  uint64_t wraps(Cycle when) const;
   void rebase(Cycle when, uint32_t count);
+  bool overflowed() const { return overflowed_ || wraps(chip_.cycle()) > wraps_cleared_; }
   void schedule(int unit, bool skip_present = false);
   void schedule_all(bool skip_present = false);
   void match(int unit, Cycle when);
@@ -72,6 +75,8 @@ class Timer {
   Cycle origin_ = 0;  // when the prescaler was at 0
   uint64_t base_tick_ = 0;
   uint32_t base_count_ = 0;
+  uint64_t wraps_cleared_ = 0;
+  bool overflowed_ = false;  // before the counter was last set
   uint8_t shift_ = kStopped;
   bool held_ = false;
   bool normal_ = true;

@@ -1,6 +1,7 @@
 #include "uno.h"
 
 extern "C" {
+#include <avr_flash.h>
 #include <sim_interrupts.h>
 }
 
@@ -42,6 +43,7 @@ Uno::Uno(const std::string& elf_path)
       watchdog_(chip_, [this] { bitten_ = true; }),
       eeprom_(chip_),
       adc_(chip_),
+      flash_(chip_),
       end_(chip_, [](Cycle) {}) {
   avr_t* avr = chip_.avr();
   listener_.uno = this;
@@ -80,9 +82,14 @@ Uno::~Uno() {
 }
 
 int Uno::on_ioctl(avr_io_t* io, uint32_t request, void*) {
-  if (request != AVR_IOCTL_WATCHDOG_RESET)
+  Uno& uno = *reinterpret_cast<Listener*>(io)->uno;
+  if (request == AVR_IOCTL_WATCHDOG_RESET) {
+    uno.watchdog_.feed();
+  } else if (request == AVR_IOCTL_FLASH_SPM) {
+    uno.flash_.store_program_memory();
+  } else {
     return -1;
-  reinterpret_cast<Listener*>(io)->uno->watchdog_.feed();
+  }
   return 0;
 }
 
@@ -94,6 +101,7 @@ void Uno::reset_peripherals() {
   usb_.reset();
   eeprom_.reset();
   adc_.reset();
+  flash_.reset();
   sensor_.keep_sampling();
   d2_.reset();
   if (run_end_ > chip_.cycle())  // a reset empties simavr's list of events

@@ -7,6 +7,7 @@
 #include "adc.h"
 #include "chip.h"
 #include "eeprom.h"
+#include "flash.h"
 #include "input.h"
 #include "lps33hw.h"
 #include "pins.h"
@@ -37,7 +38,7 @@ class Uno {
   void cycle_power(uint8_t torn);
   // What the chip is fed with. Below 2.7 V it is held in reset, and starts when it is fed again.
   void set_supply(double volts);
-  // Puts bytes into the flash.
+  // Puts bytes into the flash, as a programmer does.
   void load(uint16_t address, const uint8_t* data, size_t size);
   // Where a reset goes to: the fuse BOOTRST and the size of the bootloader.
   void set_start(uint16_t address);
@@ -48,6 +49,7 @@ class Uno {
   Usart& usart() { return usart_; }
   Eeprom& eeprom() { return eeprom_; }
   Adc& adc() { return adc_; }
+  Flash& flash() { return flash_; }
   // Where the sensor's data-ready pin goes, if it is wired.
   Input& d2() { return d2_; }
   Lps33hw& sensor() { return sensor_; }
@@ -71,7 +73,7 @@ class Uno {
   HandlerTime handler(int vector) const;
 
  private:
-  // simavr's list of peripherals, joined to hear of WDR.
+  // simavr's list of peripherals, joined to hear of WDR and SPM.
   struct Listener {
     avr_io_t io;
     Uno* uno;
@@ -101,6 +103,7 @@ class Uno {
   Watchdog watchdog_;
   Eeprom eeprom_;
   Adc adc_;
+  Flash flash_;
   Listener listener_ = {};
   std::vector<std::unique_ptr<Vector>> vectors_;
   Alarm end_;
