@@ -10,24 +10,30 @@ from tests.avr.programs import (
     DDRB,
     GTCCR,
     NOP,
+    OCR0A,
     OCR1AH,
     OCR1AL,
     OCR2A,
     PUSH,
+    RAM,
     SEI,
     STORE_CYCLES,
+    TCCR0B,
     TCCR1A,
     TCCR1B,
     TCCR1C,
     TCCR2A,
     TCCR2B,
+    TCNT0,
     TCNT1H,
     TCNT1L,
     TCNT2,
+    TIFR0,
     UBRR0L,
     UCSR0B,
     UDR0,
     boot,
+    cycle_when,
     delay,
     store,
 )
@@ -69,6 +75,20 @@ def test_force_compare_acts_at_once_and_a_match_one_clock_after_it(tmp_path: Pat
         D9: released + (MATCH + 1) * PRESCALER,
         D11: released + (MATCH + 1) * PRESCALER,
     }
+
+
+@pytest.mark.parametrize(("clock_select", "divider"), [(1, 1), (2, 8), (3, 64), (4, 256)])
+def test_timer_0_divides_by_the_prescaler_that_it_shares(
+    tmp_path: Path, clock_select: int, divider: int
+) -> None:
+    """Sections 15.7 and 17: held with timer 1, it tells a match at the next clock."""
+    program = store(
+        (GTCCR, 0x81), (OCR0A, MATCH), (TCCR0B, clock_select), (TCNT0, 0), (GTCCR, 0), (RAM, 1)
+    )  # fmt: skip
+    with boot(tmp_path, program) as uno:
+        released = cycle_when(uno, RAM, 0xFF, 1) - STORE_CYCLES
+        matched = cycle_when(uno, TIFR0, 2, 2)
+        assert matched - released == pytest.approx((MATCH + 1) * divider, abs=3)
 
 
 def test_a_wide_register_is_written_as_a_whole(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from typing import Self
 from tests.avr.simavr import CYCLES_PER_US, Uno
 
 _SLICE_US = 2_000
-# The longest that the bootloader takes for an answer: to erase and write a page, and the chip's 4 ms.
+# The bootloader's longest answer: to a page that it erases and writes, and the chip's 4 ms.
 _ANSWER_US = 14_000
 _ANSWERS_END = b"\x10"  # STK500's OK
 # By termios' names for them.

@@ -198,7 +198,8 @@ void uno_statistics_get(Uno* uno, uno_statistics* out) {
           static_cast<uint64_t>(uno->resets()),
           uno->turns(),
           uno->eeprom().writes(),
-          uno->pins().timer1().misused() || uno->pins().timer2().misused(),
+          uno->pins().timer0().misused() || uno->pins().timer1().misused() ||
+              uno->pins().timer2().misused(),
           uno->crashed()};
 }
 

@@ -74,8 +74,9 @@ Chip::Chip(const std::string& elf_path) : avr_(avr_make_mcu_by_name("atmega328p"
         timers_[timer->name - '0'] = timer;
     }
   }
-  if (uart_ == nullptr || twi_ == nullptr || timers_[1] == nullptr || timers_[2] == nullptr ||
-      watchdog_ == nullptr || eeprom_ == nullptr || adc_ == nullptr || external_ == nullptr)
+  if (uart_ == nullptr || twi_ == nullptr || timers_[0] == nullptr || timers_[1] == nullptr ||
+      timers_[2] == nullptr || watchdog_ == nullptr || eeprom_ == nullptr || adc_ == nullptr ||
+      external_ == nullptr)
     throw std::runtime_error("this simavr lacks a peripheral of the ATmega328P");
   watchdog_->io.ioctl = nullptr;  // it would answer WDR before the model here sees it
   // Otherwise a low D2 or D3 costs an event each cycle.

@@ -16,6 +16,7 @@ constexpr Port kD = {0x29, 0x2A, 0x2B};
 
 Pins::Pins(Chip& chip)
     : chip_(chip),
+      timer0_(chip, Timer::kTimer0, [](Cycle) {}),
       timer1_(chip, Timer::kTimer1, [this](Cycle when) { look(when); }),
       timer2_(chip, Timer::kTimer2, [this](Cycle when) { look(when); }) {
   for (const Port& port : {kB, kD}) {
@@ -32,6 +33,7 @@ Pins::Pins(Chip& chip)
     });
   }
   chip_.on_write(kGtccr, [this](uint8_t value) {
+    timer0_.hold(value);
     timer1_.hold(value);
     timer2_.hold(value);
   });
@@ -42,6 +44,7 @@ void Pins::reset() {
     chip_.set(port.ddr, 0);
     chip_.set(port.port, 0);
   }
+  timer0_.reset();
   timer1_.reset();
   timer2_.reset();
   look(chip_.cycle());

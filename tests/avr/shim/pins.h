@@ -22,6 +22,7 @@ class Pins {
   explicit Pins(Chip& chip);
   void reset();
   std::vector<Edge>& edges() { return edges_; }
+  const Timer& timer0() const { return timer0_; }
   const Timer& timer1() const { return timer1_; }
   const Timer& timer2() const { return timer2_; }
 
@@ -29,6 +30,7 @@ class Pins {
   void look(Cycle when);
 
   Chip& chip_;
+  Timer timer0_;  // its outputs, D5 and D6, go nowhere
   Timer timer1_;
   Timer timer2_;
   bool levels_[kServoPins] = {};

@@ -16,6 +16,19 @@ constexpr uint8_t kOverflow = 1 << 0;  // TOV
 
 }  // namespace
 
+const Timer::Kind Timer::kTimer0 = {0,
+                                    0x100,
+                                    0x44,
+                                    0x45,
+                                    0x45,
+                                    0x46,
+                                    0x47,
+                                    0x48,
+                                    0x35,
+                                    0x6E,
+                                    // Section 15.9, TCCR0B; 6 and 7 are an external clock.
+                                    {0xFF, 0, 3, 6, 8, 10, 0xFF, 0xFF},
+                                    1 << 0};
 const Timer::Kind Timer::kTimer1 = {1,
                                     0x10000,
                                     0x80,

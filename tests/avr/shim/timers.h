@@ -1,5 +1,5 @@
-// Timer 1 and timer 2 in normal mode, with their compare outputs on the four servo pins. Data
-// sheet sections 16 to 18: prescaler hold, the 16-bit registers' TEMP, output latches, force
+// The timers in normal mode; timer 1's and timer 2's compare outputs are on the four servo pins.
+// Data sheet sections 15 to 18: prescaler hold, the 16-bit registers' TEMP, output latches, force
 // compare.
 #pragma once
 
@@ -17,7 +17,7 @@ using OnOutput = std::function<void(Cycle when)>;
 
 class Timer {
  public:
-  // The two timers differ in width, addresses, prescaler taps and where force compare is.
+  // The timers differ in width, addresses, prescaler taps and where force compare is.
   struct Kind {
     int number;
     uint32_t modulus;
@@ -25,6 +25,7 @@ class Timer {
     uint8_t shifts[8];  // log2 of the divider for each clock select; 0xFF stops
     uint8_t hold;       // its bit in GTCCR
   };
+  static const Kind kTimer0;
   static const Kind kTimer1;
   static const Kind kTimer2;
 
