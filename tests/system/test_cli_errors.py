@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import select
 import subprocess
@@ -10,13 +11,17 @@ import threading
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 import serial
 from serial.tools import list_ports_common
 
+from setae import volume
 from setae.cli import main
+from setae.experiments import bristle as study
 from setae.link import session as sessions
 from setae_protocol.frame import HostDecoder, encode_board
 from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, Hello, HelloReply
@@ -306,3 +311,59 @@ def test_a_report_of_a_folder_without_logs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert "holds no log" in error_of(capsys, "report", str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("taken", "arguments"),
+    [
+        ("trial-1.mcap", ("explore", "--sim", "--obstacle", "none")),
+        ("paper.mcap", ("validate", "--sim", "--targets", "5")),
+        ("bristle.mcap", ("calibrate", "bristle", "--sim")),
+    ],
+)
+def test_a_file_that_can_not_be_replaced(
+    taken: str, arguments: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each gave a traceback, and so did the next."""
+    (tmp_path / taken).mkdir()
+    error = error_of(capsys, *arguments, "--out", str(tmp_path), "--force")
+    assert str(tmp_path) in error
+
+
+def test_pictures_of_the_workspace_that_can_not_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> NoReturn:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("setae.volume.measure", partial(volume.measure, cells=(4, 4, 4)))
+    monkeypatch.setattr("setae.report.workspace.picture", full)
+    error = error_of(capsys, "workspace", "--out", str(tmp_path))
+    assert f"{tmp_path}: No space left" in error
+
+
+def test_what_ended_early_advises_nothing_that_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It named `setae report`, which refuses a measurement without touches."""
+    monkeypatch.setattr(study.Bristle, "touches", _interrupted)
+    error = error_of(capsys, "calibrate", "bristle", "--sim", "--moves", "1",
+                     "--out", str(tmp_path))  # fmt: skip
+    assert "the robot is stopped" in error
+    assert f"{tmp_path / 'bristle.mcap'}" in error
+    assert "setae report" not in error
+
+
+def test_a_study_of_causes_that_ends_early_says_what_is_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It only said that it was interrupted, as if the targets were lost."""
+    monkeypatch.setattr("setae.experiments.causes.cases", _interrupted)
+    error = error_of(capsys, "validate", "--sim", "--targets", "5", "--causes",
+                     "--out", str(tmp_path))  # fmt: skip
+    assert "targets are done" in error
+    assert f"setae report {tmp_path}" in error
+
+
+def _interrupted(*_: object) -> NoReturn:
+    raise KeyboardInterrupt

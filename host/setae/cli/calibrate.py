@@ -10,12 +10,13 @@ from cyclopts import App, Parameter
 
 from setae import rig
 from setae.cli.common import Where, app, console, interrupts, new_folder
-from setae.cli.runs import later, say, what_is_left, write_report
+from setae.cli.runs import ended_early, make_way, say, write_report
 from setae.config import Config
-from setae.errors import InputError, SetaeError
+from setae.errors import InputError
 from setae.experiments import bristle as study
 from setae.experiments.events import Event
 from setae.record import Recorder
+from setae.report.files import writing
 from setae.scene import open_scene
 from setae.stage import Enter
 
@@ -70,25 +71,15 @@ def bristle(
         if count < 1:
             raise InputError(f"{name} is {count}.", "Give 1 or more.")
     logs: list[Path] = []
-    try:
+
+    def left() -> list[str]:
+        # Too little for a threshold, and so for a report.
+        return [f"What happened is in {logs[-1]}; `setae replay` shows it."] if logs else []
+
+    with ended_early(left, what="the robot is stopped"):
         folder = _measure(where, config, moves, touches, out, logs, force=force, jump=accept_jump)
-    except KeyboardInterrupt as interrupt:
-        failures = getattr(interrupt, "__notes__", [])
-        interrupt.__notes__ = [
-            *(["interrupted, but:", *failures] if failures else ["interrupted: it is stopped."]),
-            *what_is_left(logs),
-        ]
-        raise
-    except SetaeError as error:
-        for line in what_is_left(logs):
-            error.add_note(line)
-        raise
     if report:
-        try:
-            write_report(logs, folder)
-        except KeyboardInterrupt as interrupt:
-            interrupt.add_note(f"interrupted: the measurement is done. {later(folder)}")
-            raise
+        write_report(logs, folder)
 
 
 def _measure(
@@ -116,7 +107,7 @@ def _measure(
         folder = new_folder("bristle", out, force=force)
         log = folder / "bristle.mcap"
         if force:
-            log.unlink(missing_ok=True)
+            make_way(log)
         metadata = {"experiment": study.EXPERIMENT, "surface_mm": surface_mm}
         recorder = opened.record(log, metadata=metadata)
         logs.append(log)
@@ -144,7 +135,8 @@ def _measure(
             f"touches, {one.missed} of {one.touches} touches are missed."
         )
     fragment = folder / "bristle.toml"
-    fragment.write_text(_toml(chosen, simulated=where.simulated), encoding="utf-8")
+    with writing(folder, "The threshold"):
+        fragment.write_text(_toml(chosen, simulated=where.simulated), encoding="utf-8")
     say(f"Threshold: {fragment}")
     say(f"Log: {log}")
     return folder

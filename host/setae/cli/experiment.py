@@ -15,9 +15,9 @@ from rich.table import Table
 from setae import rig
 from setae.cli.arm import show_arm_targets
 from setae.cli.common import Where, app, console, interrupts, new_folder
-from setae.cli.runs import STOPPED, later, say, what_is_left, write_report
+from setae.cli.runs import ended_early, make_way, say, what_is_left, write_report
 from setae.config import Config
-from setae.errors import InputError, SetaeError
+from setae.errors import InputError
 from setae.experiments.descent import (
     PAPER_DESCENTS_MM,
     arm_targets_mm,
@@ -112,7 +112,7 @@ def explore(
             # Only now, so that a board that isn't there costs neither work nor a folder.
             log = folder() / f"trial-{number}.mcap"
             if force:
-                log.unlink(missing_ok=True)
+                make_way(log)
             if not where.simulated:
                 _ask_to_place(opened.robot, what, by_hand=by_hand)
             recorder = opened.record(log, metadata={"experiment": "explore", "trial": number})
@@ -125,29 +125,14 @@ def explore(
 
             yield opened, on_event
 
-    try:
+    with ended_early(lambda: what_is_left(logs), what="robot and arm are stopped"):
         results = run_trials(
             setup, obstacles=obstacles, arm_timeout_s=_MANUAL_TIMEOUT_S if by_hand else None
         )
-    except KeyboardInterrupt as interrupt:
-        failures = getattr(interrupt, "__notes__", [])
-        interrupt.__notes__ = [
-            *(["interrupted, but:", *failures] if failures else STOPPED),
-            *what_is_left(logs),
-        ]
-        raise
-    except SetaeError as error:
-        for line in what_is_left(logs):
-            error.add_note(line)
-        raise
     _print_table(results, paper=list(obstacles) == list(paper_obstacles(config)))
     say(f"Logs: {folder()}")
     if report:
-        try:
-            write_report(logs, folder())
-        except KeyboardInterrupt as interrupt:
-            interrupt.add_note(f"interrupted: the experiment is done. {later(folder())}")
-            raise
+        write_report(logs, folder())
 
 
 # A person jogs the arm by hand between two steps.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from setae.cli.common import console
-from setae.errors import ExtraMissingError
-
-STOPPED = ["interrupted: robot and arm are stopped."]
+from setae.errors import ExtraMissingError, LogError, SetaeError
 
 
 def say(text: str) -> None:
@@ -28,12 +27,58 @@ def later(folder: Path) -> str:
     return f"`setae report {folder}` makes a report of it."
 
 
+@contextmanager
+def ended_early(left: Callable[[], Sequence[str]], *, what: str) -> Iterator[None]:
+    """Have an error or a Ctrl-C say what stands still, and what the run leaves.
+
+    Parameters
+    ----------
+    left
+        Sentences about what is left, such as those of `what_is_left`.
+    what
+        What stands still after a Ctrl-C, such as "robot and arm are stopped".
+    """
+    try:
+        yield
+    except KeyboardInterrupt as interrupt:
+        failures = getattr(interrupt, "__notes__", [])
+        stopped = ["interrupted, but:", *failures] if failures else [f"interrupted: {what}."]
+        interrupt.__notes__ = [*stopped, *left()]
+        raise
+    except SetaeError as error:
+        for line in left():
+            error.add_note(line)
+        raise
+
+
+def make_way(log: Path) -> None:
+    """Remove the log of an earlier run, because --force was given.
+
+    Raises
+    ------
+    LogError
+        It can't be removed.
+    """
+    try:
+        log.unlink(missing_ok=True)
+    except OSError as error:
+        raise LogError(
+            f"{log} can't be replaced: {error.strerror}.", "Give another --out."
+        ) from error
+
+
 def write_report(logs: Sequence[Path], folder: Path) -> None:
-    """Write the report, or say why there is none: the experiment itself is done."""
+    """Write the report, or say why there is none: the experiment itself is done.
+
+    So does a Ctrl-C meanwhile.
+    """
     from setae import report
 
     try:
         path = report.write(logs, folder / "report.html")
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note(f"interrupted: the experiment is done. {later(folder)}")
+        raise
     except ExtraMissingError as error:
         text = f"No report: {error} {later(folder)}"
         console.print(text, style="yellow", markup=False, soft_wrap=True)

@@ -14,9 +14,9 @@ from setae import record, rig, tendons
 from setae.arc import FloatArray
 from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.cli.errors_table import print_causes, print_runs, print_targets
-from setae.cli.runs import later, say, what_is_left, write_report
+from setae.cli.runs import ended_early, later, make_way, say, what_is_left, write_report
 from setae.config import Config
-from setae.errors import InputError, SetaeError
+from setae.errors import InputError
 from setae.experiments import causes as why
 from setae.experiments import positions as measurements
 from setae.experiments import runs, view
@@ -121,7 +121,9 @@ def validate_command(
         drive = _Drive(where, config, noise, out, resume=resume, force=force)
         folder = drive.all(models, wanted, accept_jump=accept_jump)
         if causes:
-            _study(where, config, models[0], wanted, noise, folder, force=force)
+            with ended_early(lambda: [f"Its targets are done. {later(folder)}"],
+                             what="the study of causes is not whole"):  # fmt: skip
+                _study(where, config, models[0], wanted, noise, folder)
     logs = sorted(folder.glob("*.mcap"))
     read = [record.read(log) for log in logs]
     found = runs.read(runs.of_kind(read, runs.EXPERIMENT))
@@ -130,11 +132,7 @@ def validate_command(
         print_causes(why.effects(log))
     say(f"Logs: {folder}")
     if report and any(run.poses for run in found):
-        try:
-            write_report(logs, folder)
-        except KeyboardInterrupt as interrupt:
-            interrupt.add_note(f"interrupted: the experiment is done. {later(folder)}")
-            raise
+        write_report(logs, folder)
 
 
 class _Drive:
@@ -161,25 +159,13 @@ class _Drive:
 
     def all(self, models: Sequence[str], targets: Sequence[Target], *, accept_jump: bool) -> Path:
         """Run every model; the folder with the logs."""
-        try:
+        with ended_early(self._what_is_left, what="the robot is stopped"):
             for model in models:
                 left = [target for target in targets if target.label not in self._done(model)]
                 if left:
                     self._one(model, left, accept_jump=accept_jump)
                 else:
                     say(f"Model {model}: all {len(targets)} targets are done already.")
-        except KeyboardInterrupt as interrupt:
-            failures = getattr(interrupt, "__notes__", [])
-            stopped = ["interrupted: the robot is stopped."]
-            interrupt.__notes__ = [
-                *(["interrupted, but:", *failures] if failures else stopped),
-                *self._what_is_left(),
-            ]
-            raise
-        except SetaeError as error:
-            for line in self._what_is_left():
-                error.add_note(line)
-            raise
         return self._where_to()
 
     def _what_is_left(self) -> list[str]:
@@ -215,7 +201,7 @@ class _Drive:
                 log = log.with_name(f"{model}-{number}.mcap")
                 number += 1
         elif self._force:
-            log.unlink(missing_ok=True)
+            make_way(log)
         return log
 
     def _one(self, model: str, targets: Sequence[Target], *, accept_jump: bool) -> None:
@@ -312,7 +298,7 @@ def _import(
     folder = new_folder("validate", out, force=force or drove)
     log = folder / f"{models[0]}-measured.mcap"
     if force:
-        log.unlink(missing_ok=True)
+        make_way(log)
     measured(log, poses, config, model=models[0], files=[Path(file).name for file in files])
     say(f"{len(poses)} of {len(every)} targets measured.")
     return folder
@@ -325,15 +311,12 @@ def _study(
     targets: Sequence[Target],
     noise: Noise,
     folder: Path,
-    *,
-    force: bool,
 ) -> None:
     """Drive on the plant's imperfections one by one; one log of all."""
     values = rig.simulator_parameters(config, where.seed)
     study = why.cases(rig.plants.by_cause(values), model, list(tendons.MODELS))
     path = folder / f"{why.EXPERIMENT}.mcap"
-    if force or path.exists():
-        path.unlink(missing_ok=True)
+    make_way(path)  # an earlier study of the same run
     metadata = {"experiment": why.EXPERIMENT, "simulated": True, "seed": where.seed,
                 "plant": config.plant, "config": config.to_toml()}  # fmt: skip
     with record.Recorder(path, metadata=metadata) as recorder, console.status("") as status:

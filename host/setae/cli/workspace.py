@@ -10,6 +10,7 @@ from rich.table import Table
 
 from setae import tendons, volume
 from setae.cli.common import app, console, new_folder
+from setae.cli.runs import say
 from setae.config import load
 from setae.volume import Fate, Volumes
 
@@ -40,6 +41,7 @@ def workspace(
         Use --out though it holds files; those of the same names are replaced.
     """
     from setae.report import workspace as pictures
+    from setae.report.files import writing
 
     robot = load(config)
     model = tendons.model(model or robot.motion.model).name
@@ -47,10 +49,9 @@ def workspace(
     folder = new_folder("workspace", out, force=force)
     measured = volume.measure(robot, model)
     _print(measured, model)
-    console.print(f"Picture: {pictures.picture(folder / 'workspace.png', robot, model, measured)}",
-                  soft_wrap=True)  # fmt: skip
-    console.print(f"Page: {pictures.page(folder / 'workspace.html', robot, model, measured)}",
-                  soft_wrap=True)  # fmt: skip
+    with writing(folder, "The pictures"):
+        say(f"Picture: {pictures.picture(folder / 'workspace.png', robot, model, measured)}")
+        say(f"Page: {pictures.page(folder / 'workspace.html', robot, model, measured)}")
 
 
 def _print(measured: Volumes, model: str) -> None:

@@ -56,13 +56,13 @@ def logs_of(logs: str | Path | Iterable[str | Path | Log]) -> Sequence[str | Pat
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[None]:
-    """Make the folder, and turn failures to write into it into LogError."""
+def writing(folder: Path, what: str = "The report") -> Iterator[None]:
+    """Make the folder, and turn failures to write `what` into it into LogError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         yield
     except OSError as error:
         raise LogError(
-            f"The report can't be written to {folder}: {error.strerror or error}.",
+            f"{what} can't be written to {folder}: {error.strerror or error}.",
             "Check the folder and the room on the disk.",
         ) from error
