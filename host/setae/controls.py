@@ -60,7 +60,13 @@ class Controls:
         ConfigError
             The board isn't relaxed and holds other limits.
         """
-        self._board.wait(lambda: self._board.reported, REPLY_S, "the board's first telemetry")
+        # A board that an earlier host left stopped can be looked at, and resumed.
+        self.wait(
+            lambda: self._board.reported,
+            timeout_s=REPLY_S,
+            what="the board's first telemetry",
+            watch=False,
+        )
         wanted = self._planner.limits
         if self.state is State.RELAXED:
             self._board.request(wanted)
@@ -314,7 +320,9 @@ class Controls:
 
     # ---------------------------------------------------------------------- waits
 
-    def wait(self, done: Callable[[], bool], *, timeout_s: float, what: str) -> None:
+    def wait(
+        self, done: Callable[[], bool], *, timeout_s: float, what: str, watch: bool = True
+    ) -> None:
         """Wait for something, with the robot watched meanwhile.
 
         Parameters
@@ -325,8 +333,10 @@ class Controls:
             After this long, DeadlineError.
         what
             What is waited for, for the message.
+        watch
+            Whether a stop, trip or fault ends the wait with its error.
         """
-        self._board.wait(done, timeout_s, what)
+        self._board.wait(done, timeout_s, what, watch=watch)
 
     def host_time_us(self, frame: int, phase_us: int) -> int:
         """A board time on the session's clock."""

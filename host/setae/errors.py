@@ -294,7 +294,7 @@ class StoppedError(SetaeError):
     command line.
     """
 
-    default_remedy = "Call resume() once the robot may move again."
+    default_remedy = "Once the robot may move again, call resume(), or give `setae enable`."
 
 
 class TrippedError(SetaeError):
@@ -304,7 +304,7 @@ class TrippedError(SetaeError):
     crossed the coarse threshold.
     """
 
-    default_remedy = "Make room, then call resume()."
+    default_remedy = "Make room, then call resume(), or give `setae enable`."
 
 
 class PoseUnknownError(SetaeError):

@@ -65,6 +65,7 @@ def test_without_out_the_next_free_folder_is_taken(
         (("move", "-12", "0", "60", "--relax"), "At (-12.0"),
         (("probe", "15", "0", "60"), "No contact"),
         (("stop",), "stopped"),
+        (("enable",), "Holding at (0.0, 0.0, 70.0) mm"),
         (("relax",), "Relaxed"),
     ],
 )

@@ -232,6 +232,20 @@ def test_a_sensor_that_falls_silent_under_guard_is_a_fault_not_a_blind_move() ->
         assert robot.state is State.HOLDING
 
 
+def test_a_robot_left_stopped_can_be_connected_to_and_resumed() -> None:
+    """Connecting raised StoppedError, whose advice was to call resume()."""
+    with compressed() as made:
+        made.robot.stop()
+        robot = Robot(made.robot.session, made.robot.config)
+        robot.prepare()
+        assert robot.state is State.STOPPED
+        with pytest.raises(StoppedError):
+            robot.enable()
+        robot.resume()
+        robot.enable()
+        robot.move_to(TARGET_MM)
+
+
 def test_an_unknown_pose_needs_a_decision_before_the_first_pulse() -> None:
     with bench(parameters={"board.pose_known": 0}) as made:
         with pytest.raises(PoseUnknownError, match="accept_jump"):

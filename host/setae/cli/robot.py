@@ -18,7 +18,7 @@ from setae import rig
 from setae.cli.common import Where, app, console, interrupts
 from setae.errors import SetaeError
 from setae.robot import Robot
-from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, Fault, ResetCause, Sensor
+from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, Fault, ResetCause, Sensor, State
 
 Flag = Annotated[bool, Parameter(negative="")]
 # Negative coordinates are numbers, not options.
@@ -163,6 +163,24 @@ def stop(*, where: Where | None = None) -> None:
 
 
 @app.command
+def enable(*, accept_jump: Flag = False, where: Where | None = None) -> None:
+    """Switch the servos on where they are, and hold; also after a stop, contact or fault.
+
+    Parameters
+    ----------
+    accept_jump
+        Enable the servos though nobody knows where they are, or they were left where the
+        configuration doesn't allow them: the first pulse may move them at full speed.
+    where
+        Which robot.
+    """
+    with _connect(where, leave="hold") as robot:
+        robot.resume()
+        robot.enable(accept_jump=accept_jump)
+        console.print(f"Holding at {_mm(robot.position_mm)}, tendons {_mm(robot.lengths_mm)}.")
+
+
+@app.command
 def relax(*, accept_jump: Flag = False, where: Where | None = None) -> None:
     """Unwind the tendons slowly to the free length, then switch the servos off.
 
@@ -253,6 +271,7 @@ def _describe(where: Where) -> str:
 def _check_board(where: Where, checks: _Checks) -> str:
     with _connect(where, leave="hold") as robot:
         _check_reset(robot, checks)
+        _check_state(robot, checks)
         _check_pressure(robot, checks)
         _check_status(robot, checks)
         port = robot.session.transport.name
@@ -269,6 +288,14 @@ def _check_reset(robot: Robot, checks: _Checks) -> None:
         checks.good("last start", cause.doc)
 
 
+def _check_state(robot: Robot, checks: _Checks) -> None:
+    text = robot.state.name.lower()
+    if robot.state in (State.STOPPED, State.TRIPPED, State.FAULT):
+        checks.bad("state", f"{text}. See why, make it safe, then give `setae enable`.")
+    else:
+        checks.good("state", text)
+
+
 # Of the pressure at rest, peak to peak; the threshold of a contact is 15 hPa.
 _PRESSURE_NOISE_MAX_HPA = 3.0
 _PRESSURE_S = 1.0
@@ -283,7 +310,7 @@ def _check_pressure(robot: Robot, checks: _Checks) -> None:
             samples.append(robot.pressure_hpa)
         return robot.now_us >= end_us
 
-    robot.wait(done, timeout_s=_PRESSURE_S + 1, what="pressure samples")
+    robot.wait(done, timeout_s=_PRESSURE_S + 1, what="pressure samples", watch=False)
     sensor = robot.telemetry.sensor
     if sensor is not Sensor.OK or not samples:
         # A sensor's state has the number of its fault.
@@ -344,6 +371,7 @@ def _sensor(robot: Robot) -> Sensor:
         lambda: robot.telemetry.sensor is Sensor.OK or robot.now_us >= end_us,
         timeout_s=1.0,
         what="the sensor to start",
+        watch=False,
     )
     return robot.telemetry.sensor
 
