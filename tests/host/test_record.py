@@ -192,6 +192,12 @@ def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
         read(path)
 
 
+def test_what_is_no_log_is_not_read_whole() -> None:
+    """Reading /dev/zero took all memory, until the system killed the program."""
+    with pytest.raises(LogError, match="no log"):
+        read("/dev/zero")
+
+
 def test_errors_name_the_file_and_what_to_do(tmp_path: Path) -> None:
     path = write_seconds(tmp_path / "run.mcap", 0.1)
     with pytest.raises(LogError, match="exists already"):

@@ -102,6 +102,14 @@ def test_a_port_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
     assert "setae ports" in error
 
 
+@pytest.mark.parametrize("port", ["/dev/null", "/tmp"])
+def test_something_else_than_a_port(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """It was said to be busy: close the other program, join the group."""
+    error = error_of(capsys, "info", "--port", port)
+    assert f"{port} is no serial port" in error
+    assert "setae ports" in error
+
+
 def test_a_port_that_another_program_holds(capsys: pytest.CaptureFixture[str]) -> None:
     with pseudo_port() as port, serial.Serial(port, exclusive=True):
         error = error_of(capsys, "info", "--port", port)
@@ -261,6 +269,7 @@ def test_flashing_without_sources_or_tools_says_what_is_missing(
         (("explore", "--no-such-option"), "no-such-option"),
         (("explor",), "explore"),
         (("info", "--seed", "seven"), "seven"),
+        (("info", "--sim", "--seed", "1.5"), "1.5"),  # was taken for 2
         (("report",), "log"),
         (("move", "1", "2", "three", "--sim"), "three"),
     ],

@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from setae import rig
-from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.common import Where, Whole, app, console, interrupts, new_folder
 from setae.cli.runs import ended_early, make_way, say, write_report
 from setae.config import Config
 from setae.errors import InputError
@@ -33,8 +33,8 @@ app.command(calibrate)
 @calibrate.command
 def bristle(
     *,
-    moves: int = 100,
-    touches: int = 100,
+    moves: Whole = 100,
+    touches: Whole = 100,
     out: Path | None = None,
     force: Flag = False,
     report: bool = True,

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App, Parameter, Token
 from rich.console import Console
 
 import setae
@@ -26,6 +26,18 @@ app = App(
 )
 
 console = Console(highlight=False)
+
+
+def _whole(kind: object, tokens: Sequence[Token]) -> int:
+    del kind
+    try:
+        return int(tokens[0].value)
+    except ValueError:
+        raise ValueError(f"{tokens[0].value!r} is no whole number.") from None
+
+
+Whole = Annotated[int, Parameter(converter=_whole)]
+"""A whole number; cyclopts alone rounds 1.5 to 2."""
 
 
 @Parameter(name="*")
@@ -55,7 +67,7 @@ class Where:
     plant: str | None = None
     port: str | None = None
     config: Path | None = None
-    seed: int = 0
+    seed: Whole = 0
 
     @property
     def url(self) -> str | None:

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from setae import record, rig, tendons
 from setae.arc import FloatArray
-from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.common import Where, Whole, app, console, interrupts, new_folder
 from setae.cli.errors_table import print_causes, print_runs, print_targets
 from setae.cli.runs import ended_early, later, make_way, say, what_is_left, write_report
 from setae.config import Config
@@ -38,11 +38,11 @@ _PICTURE_TIMEOUT_S = 3600.0
 def validate_command(
     *,
     model: Several = None,
-    targets: int | None = None,
+    targets: Whole | None = None,
     positions: Several = None,
     frame: Path | None = None,
     noise_mm: float = 0.0,
-    noise_seed: int = 0,
+    noise_seed: Whole = 0,
     out: Path | None = None,
     causes: Flag = False,
     resume: Flag = False,

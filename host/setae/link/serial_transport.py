@@ -142,9 +142,12 @@ def _open(port: str) -> serial.Serial:
         _keep_others_out(opened)
         return opened
     except serial.SerialException as error:
-        number = error.errno or getattr(error.__context__, "errno", None)
+        # What the system said, an error of termios included, which has no errno of its own.
+        number = error.errno or next(iter(getattr(error.__context__, "args", ())), None)
         if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV) or "FileNotFoundError" in str(error):
             raise PortNotFoundError(f"There is no serial port {port}.") from error
+        if number in (errno.ENOTTY, errno.EISDIR):
+            raise PortNotFoundError(f"{port} is no serial port.") from error
         if number in (errno.EACCES, errno.EPERM):
             raise PortBusyError(
                 f"This user may not open {port}.",

@@ -37,11 +37,19 @@ def read(path: str | Path) -> Log:
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            # Before the rest: whatever isn't a log may be larger than the memory.
+            start = file.read(len(_MAGIC))
+            data = start + file.read() if start == _MAGIC else b""
+    except IsADirectoryError as error:
+        raise LogError(f"{path} is a folder.", "Give one of the logs in it.") from error
     except OSError as error:
         raise LogError(f"{path} can't be read: {error.strerror}.", "Check the name.") from error
-    if not data.startswith(_MAGIC):
-        raise LogError(f"{path} is no log: it doesn't start as an MCAP file does.")
+    if not data:
+        raise LogError(
+            f"{path} is no log: it doesn't start as an MCAP file does.",
+            "Give a file that an experiment wrote.",
+        )
     reading = _Reading(data)
     reading.run()
     if not reading.profile_seen:
