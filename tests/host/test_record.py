@@ -155,6 +155,15 @@ def test_a_killed_run_loses_at_most_a_second(tmp_path: Path) -> None:
     assert read(path).damage is None
 
 
+def test_a_run_that_is_killed_at_once_leaves_a_log_that_says_what_it_was(tmp_path: Path) -> None:
+    """It left an empty file, for which the report of the whole folder was refused."""
+    recorder = Recorder(tmp_path / "run.mcap", metadata=METADATA)
+    log = read(tmp_path / "run.mcap")
+    recorder.close()
+    assert log.metadata["seed"] == METADATA["seed"]
+    assert log.damage is not None
+
+
 def test_a_broken_block_costs_only_itself(tmp_path: Path) -> None:
     path = write_seconds(tmp_path / "run.mcap", 8.0)
     data = bytearray(path.read_bytes())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -113,6 +114,26 @@ def test_what_a_damaged_log_lacks_is_told_beside_the_report(
         assert len(error) == 1
         assert "cut.mcap is not whole" in error[0]
         assert "could not be read" in error[0]
+
+
+def test_a_log_of_a_folder_that_holds_nothing_is_left_out(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One trial that was killed at once made the others' report impossible."""
+    shutil.copy(run / "trial-1.mcap", tmp_path)
+    (tmp_path / "trial-2.mcap").write_bytes((run / "trial-2.mcap").read_bytes()[:900])
+    (tmp_path / "trial-3.mcap").write_bytes(b"")
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(tmp_path)])
+    assert ended.value.code == 0
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 2
+    assert "trial-3.mcap is no log" in told[0]
+    assert "trial-2.mcap is not whole" in told[1]
+    assert len((tmp_path / "trials.csv").read_text().splitlines()) == 2
+    with pytest.raises(SystemExit):
+        main(["report", str(tmp_path / "trial-2.mcap")])
+    assert "before its experiment began" in capsys.readouterr().err
 
 
 def test_ctrl_c_while_the_report_is_written_says_how_to_get_it_later(

@@ -16,11 +16,13 @@ from setae.cli import main
 from setae.cli.common import interrupts
 from setae.config import load
 from setae.experiments import causes, runs
+from setae.experiments.accuracy import Pose
 from setae.experiments.events import Event
 from setae.experiments.targets import choose, paper_targets
-from setae.experiments.validate import Noise, validate
+from setae.experiments.validate import Noise, measured, validate
 from setae.link.session import Session
 from setae.report.causes import picture, section
+from setae.report.validation_pictures import bubbles_picture
 from setae.robot import Robot
 from setae.scene import open_scene
 
@@ -117,6 +119,15 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_where_it_was(
     kept = {pose.target.label: pose.position_mm for pose in after.poses}
     for pose in before.poses:
         assert kept[pose.target.label] == pytest.approx(pose.position_mm)
+
+
+def test_a_run_that_ended_before_its_first_bent_target_is_reported(tmp_path: Path) -> None:
+    """The report failed over a shape, and with it the advice that Ctrl-C gives."""
+    config = load()
+    straight = [target for target in paper_targets(config) if target.bend_deg == 0][:2]
+    poses = [Pose(target, np.array(target.position_mm)) for target in straight]
+    measured(tmp_path / "paper.mcap", poses, config, model="paper", files=["x.csv"])
+    bubbles_picture(tmp_path / "bubbles.png", runs.read([record.read(tmp_path / "paper.mcap")]))
 
 
 def test_ctrl_c_stops_the_robot() -> None:

@@ -27,7 +27,7 @@ def report(log: Path, *more: Path, out: Path | None = None) -> None:
     """
     from setae import report as pages
 
-    logs = [record.read(path) for given in (log, *more) for path in _logs_of(given)]
+    logs = [read for given in (log, *more) for read in _logs_of(given)]
     page = out or (log if log.is_dir() else log.parent)
     if page.suffix.lower() not in (".html", ".htm"):
         page = page / "report.html"
@@ -37,13 +37,19 @@ def report(log: Path, *more: Path, out: Path | None = None) -> None:
     console.print(f"Report: {path}", markup=False, soft_wrap=True)
 
 
-def _logs_of(given: Path) -> list[Path]:
-    """The log itself, or the logs in a folder."""
+def _logs_of(given: Path) -> list[record.Log]:
+    """The log itself, or the logs in a folder; what can't be read there is told, and left out."""
     if not given.is_dir():
-        return [given]
-    if logs := sorted(given.glob("*.mcap")):
-        return logs
-    raise LogError(f"{given} holds no log.", "Give the folder that `setae explore` wrote.")
+        return [record.read(given)]
+    logs = []
+    for path in sorted(given.glob("*.mcap")):
+        try:
+            logs.append(record.read(path))
+        except LogError as error:
+            print(f"setae: Left out: {error.problem}", file=sys.stderr)
+    if not logs:
+        raise LogError(f"{given} holds no log.", "Give the folder that an experiment wrote.")
+    return logs
 
 
 def _warn_of_damage(log: record.Log) -> None:

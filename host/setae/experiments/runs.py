@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from setae import kinematics, workspace
 from setae.config import Config, loads
 from setae.errors import ConfigError, LogError
 from setae.experiments.accuracy import Pose
@@ -53,6 +55,11 @@ class Run:
     targets: tuple[Target, ...]
     config: Config
     logs: tuple[Log, ...]
+
+    def held(self, targets: Sequence[Target]) -> NDArray[np.bool_]:
+        """Whether tendons that only pull can hold each of some targets, (p,)."""
+        wanted_mm = np.array([target.position_mm for target in targets]).reshape(-1, 3)
+        return workspace.check(kinematics.inverse(wanted_mm), self.config, "paper").holdable
 
     @property
     def metadata(self) -> dict[str, Any]:

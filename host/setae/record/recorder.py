@@ -63,6 +63,8 @@ class Recorder:
             self._writer.start(profile=PROFILE, library=LIBRARY)
             self._write_metadata(metadata or {})
             self._channels = {topic: self._register(topic) for topic in TOPICS}
+            # A run that is killed at once leaves a log that says what it was to be.
+            self._file.flush()
 
     def _register(self, topic: str) -> int:
         number = self._writer.register_schema(

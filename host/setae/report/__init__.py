@@ -38,9 +38,24 @@ def write(logs: str | Path | Iterable[str | Path | Log], path: str | Path) -> Pa
     -------
     Path
         The page.
+
+    Raises
+    ------
+    LogError
+        A log can't be read, the logs are of several experiments, none holds anything to
+        report, or the page can't be written.
+    ExtraMissingError
+        Matplotlib or Plotly isn't installed.
     """
     path = Path(path)
-    read = [log if isinstance(log, Log) else record.read(log) for log in files.logs_of(logs)]
+    given = [log if isinstance(log, Log) else record.read(log) for log in files.logs_of(logs)]
+    # A run that was killed at once leaves a log without anything in it.
+    read = [log for log in given if log.events() or "experiment" not in log.metadata]
+    if not read:
+        names = ", ".join(str(log.path) for log in given)
+        raise LogError(
+            f"Nothing to report in {names}: it ended before its experiment began.", "Run it again."
+        )
     kinds = {str(log.metadata.get("experiment") or "explore") for log in read}
     if len(kinds) > 1 and kinds != {"validate", "causes"}:
         raise LogError(

@@ -10,21 +10,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from setae import kinematics, workspace
 from setae.errors import LogError
 from setae.experiments import causes, runs
 from setae.experiments.accuracy import Pose, Summary, by_group
 from setae.experiments.causes import EXPERIMENT
 from setae.experiments.runs import Run
-from setae.experiments.targets import Target
 from setae.record import Log, read
 from setae.report import causes as why
 from setae.report import extras, files, paper, validation_page, validation_pictures
 from setae.report.files import Report
 
-__all__ = ["held", "write"]
+__all__ = ["write"]
 
 
 def write(
@@ -116,12 +112,6 @@ def as_json(shown: Sequence[Run], studies: Sequence[Log] = ()) -> dict[str, Any]
     return _finite(data)  # type: ignore[no-any-return]
 
 
-def held(run: Run, targets: Sequence[Target]) -> np.ndarray:
-    """Whether tendons that only pull can hold each target, (p,)."""
-    arc = kinematics.inverse(np.array([target.position_mm for target in targets]))
-    return workspace.check(arc, run.config, "paper").holdable
-
-
 def _finite(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _finite(item) for key, item in value.items()}
@@ -146,7 +136,7 @@ def _targets(shown: Sequence[Run]) -> _Rows:
 
     def rows() -> Iterator[Sequence[object]]:
         for run in shown:
-            holds = held(run, [pose.target for pose in run.poses])
+            holds = run.held([pose.target for pose in run.poses])
             for pose, good in zip(run.poses, holds, strict=True):
                 yield _target_row(run, pose, holds=bool(good))
 

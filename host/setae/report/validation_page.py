@@ -10,7 +10,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from setae import kinematics, workspace
 from setae.experiments.accuracy import OVERALL, Spread, Summary, by_group
 from setae.experiments.runs import Run
 from setae.report import extras, palette, paper, template
@@ -73,7 +72,7 @@ def finding(runs: Sequence[Run]) -> str:
     text = f"Mean error in the bending plane, over {count}: {'; '.join(parts)}. "
     text += f"The paper’s robot: {_spread(theirs)} mm."
     run = runs[0]
-    holds = _held(run)
+    holds = run.held([pose.target for pose in run.poses])
     if 0 < holds.sum() < len(holds):
         errors = np.array([pose.in_plane_mm for pose in run.poses])
         text += (
@@ -82,11 +81,6 @@ def finding(runs: Sequence[Run]) -> str:
             f"that pushes {errors[~holds].mean():.2f} mm (model {run.model})."
         )
     return text
-
-
-def _held(run: Run) -> np.ndarray:
-    wanted = np.array([pose.target.position_mm for pose in run.poses])
-    return workspace.check(kinematics.inverse(wanted), run.config, "paper").holdable
 
 
 def _badges(runs: Sequence[Run]) -> str:
@@ -202,7 +196,8 @@ def _data(runs: Sequence[Run]) -> dict[str, Any]:
 
 def _poses(run: Run) -> list[dict[str, Any]]:
     rows = []
-    for pose, held in zip(run.poses, _held(run), strict=True):
+    holds = run.held([pose.target for pose in run.poses])
+    for pose, held in zip(run.poses, holds, strict=True):
         wanted = pose.target.position_mm
         target = [wanted[pose.target.lateral_axis], wanted[2]]
         rows.append(

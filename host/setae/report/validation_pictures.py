@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from setae import kinematics, workspace
+from setae import workspace
 from setae.experiments.accuracy import in_plane_mm
 from setae.experiments.runs import Run
-from setae.experiments.targets import COMPRESSION, GROUPS, Target, combinations
+from setae.experiments.targets import COMPRESSION, GROUPS, combinations
 from setae.report import extras, palette, paper, style
 from setae.report import workspace as workspace_pictures
 from setae.volume import Fate
@@ -188,7 +188,7 @@ def _bubbles(axes: Any, run: Run) -> None:
     top = arc.top_mm[beyond]
     axes.scatter(top[:, 0], top[:, 2], s=16, marker="x", color="#c5ced6", lw=1.0, zorder=1)
     shown = [places[place] for place in errors]
-    holds = _held(run, shown)
+    holds = run.held(shown)
     for target, error, good in zip(shown, errors.values(), holds, strict=True):
         x, z = target.position_mm[0], target.position_mm[2]
         colour = _heat(error)
@@ -212,11 +212,6 @@ def _bubbles(axes: Any, run: Run) -> None:
 def _heat(error_mm: float) -> str:
     """Colour of an error, the scale's middle at the paper's mean."""
     return palette.heat(error_mm / (2 * paper.validation()["all"].distance.mean_mm))
-
-
-def _held(run: Run, targets: Sequence[Target]) -> np.ndarray:
-    arc = kinematics.inverse(np.array([target.position_mm for target in targets]))
-    return workspace.check(arc, run.config, "paper").holdable
 
 
 # ------------------------------------------------------------------------------ places
@@ -250,7 +245,7 @@ def _places(axes: Any, run: Run, plane: str) -> None:
         axes.text(0.5, 0.5, "not measured", ha="center", transform=axes.transAxes,
                   color=palette.MUTED)  # fmt: skip
         return
-    holds = _held(run, [pose.target for pose in poses])
+    holds = run.held([pose.target for pose in poses])
     wanted = np.array(
         [[pose.target.position_mm[pose.target.lateral_axis], pose.target.position_mm[2]]
          for pose in poses]
