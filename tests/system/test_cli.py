@@ -121,7 +121,7 @@ def test_a_log_of_a_folder_that_holds_nothing_is_left_out(
 ) -> None:
     """One trial that was killed at once made the others' report impossible."""
     shutil.copy(run / "trial-1.mcap", tmp_path)
-    (tmp_path / "trial-2.mcap").write_bytes((run / "trial-2.mcap").read_bytes()[:900])
+    killed = record.Recorder(tmp_path / "trial-2.mcap", metadata={"experiment": "explore"})
     (tmp_path / "trial-3.mcap").write_bytes(b"")
     with pytest.raises(SystemExit) as ended:
         main(["report", str(tmp_path)])
@@ -134,6 +134,7 @@ def test_a_log_of_a_folder_that_holds_nothing_is_left_out(
     with pytest.raises(SystemExit):
         main(["report", str(tmp_path / "trial-2.mcap")])
     assert "before its experiment began" in capsys.readouterr().err
+    killed.close()
 
 
 def test_ctrl_c_while_the_report_is_written_says_how_to_get_it_later(
