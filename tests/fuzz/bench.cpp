@@ -15,7 +15,7 @@ constexpr size_t kBytesPerPoll = 63;
 
 void print(const Step& step) {
   fprintf(stderr, "frame %u  mode %d  epoch %d  session %d  expects %d  queued %d  attached %d",
-          step.frame, static_cast<int>(step.after.mode), step.after.epoch, step.after.session,
+          step.after.frame, static_cast<int>(step.after.mode), step.after.epoch, step.after.session,
           step.after.expected, step.after.queued, step.after.attached);
   fprintf(stderr, "  guard %d", static_cast<int>(step.after.guard));
   if (step.reading.fresh)
@@ -39,7 +39,6 @@ void Bench::restart(protocol::ResetCause cause, bool powered_off) {
   machine.restart(cause);
   machine.begin_frame_at_call(0);
   board_.reset(new Board(machine));
-  seen_frame_ = 0;
   sample_due_us_ = 0;
   tap_ = ReferenceDecoder();
   motion_.on_restart();
@@ -100,9 +99,7 @@ void Bench::poll() {
   board_->poll();
   shot_ = BoardProbe::look(*board_);
   step_.after = shot_;
-  step_.frame = frame();
-  step_.frame_began = step_.frame != seen_frame_;
-  seen_frame_ = step_.frame;
+  step_.frame_began = step_.after.frame != step_.before.frame;
   step_.stalled = !listening_;
   step_.switch_open = machine.stop_switch_open();
   machine.take_reading(step_.reading);
@@ -123,9 +120,12 @@ void Bench::listen(bool listening) {
 }
 
 void Bench::drain() {
-  uint8_t byte;
-  while (listening_ && machine.pop_tx(byte))
-    line_.on_byte(byte);
+  TransmitRing& ring = machine.to_send();
+  while (listening_ && ring.size() != 0) {
+    const uint8_t count = ring.front_size();
+    line_.on_bytes(ring.front(), count);
+    ring.drop(count);
+  }
 }
 
 void Bench::on_output(const Output& output) {

@@ -32,7 +32,6 @@ class Bench final : Machine::Listener {
 
   const Snapshot& board() const { return shot_; }
   const LineWatch& line() const { return line_; }
-  uint32_t frame() { return static_cast<uint32_t>(machine.board_us() / protocol::kServoFrameUs); }
 
   Machine machine;
   protocol::Sensor sensor = protocol::Sensor::kOk;
@@ -49,7 +48,6 @@ class Bench final : Machine::Listener {
   std::unique_ptr<Board> board_;
   Snapshot shot_ = {};
   Step step_ = {};
-  uint32_t seen_frame_ = 0;
   uint64_t sample_due_us_ = 0;
   uint32_t samples_ = 0;
   bool listening_ = true;

@@ -27,6 +27,7 @@ MAX_BYTES: Final = {"decoder": 96, "board": 200}
 
 SANITIZED: Final = (
     "clang++", "-O2", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
+    "-fsanitize-trap=undefined",  # half as long again with words instead
 )  # fmt: skip
 COUNTED: Final = ("clang++", "-O1", "-g", "-fprofile-instr-generate", "-fcoverage-mapping")
 FAST: Final = ("clang++", "-O2")

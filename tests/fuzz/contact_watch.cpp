@@ -12,7 +12,7 @@ using protocol::Guard;
 void ContactWatch::on_step(const Step& step) {
   ticks_ += step.frame_began;
   if (step.reading.fresh)
-    sampled_frame_ = step.frame;
+    sampled_frame_ = step.after.frame;
   if (step.guards()) {
     const auto message = step.read<protocol::GuardMessage>();
     threshold_raw_ = message.threshold_raw;
@@ -36,7 +36,7 @@ void ContactWatch::on_step(const Step& step) {
     crossed_ = 0;
   }
   expect(step.reading.status == protocol::Sensor::kOk, "no guard is armed without a sensor");
-  expect(step.frame - sampled_frame_ <= protocol::kSensorSilentFrames,
+  expect(step.after.frame - sampled_frame_ <= protocol::kSensorSilentFrames,
          "no guard is armed while the sensor is silent");
   expect(ticks_ - armed_tick_ <= deadline_frames_, "a guarded move ends at its deadline");
   expect(step.after.mode == Mode::kHolding || step.after.mode == Mode::kPlaying,

@@ -32,11 +32,14 @@ void LineWatch::on_restart(bool powered_off) {
     known.due_tick = kRepeatFrames;
 }
 
-void LineWatch::on_byte(uint8_t wire) {
-  const ReferenceDecoder::Found found = decoder_.push(wire);
-  expect(found != ReferenceDecoder::Found::kDamage, "the board sends whole frames");
-  if (found == ReferenceDecoder::Found::kFrame)
-    hear(decoder_.inside());
+void LineWatch::on_bytes(const uint8_t* wire, size_t size) {
+  for (size_t taken = 0; taken < size;) {
+    ReferenceDecoder::Found found;
+    taken += decoder_.take(wire + taken, size - taken, found);
+    expect(found != ReferenceDecoder::Found::kDamage, "the board sends whole frames");
+    if (found == ReferenceDecoder::Found::kFrame)
+      hear(decoder_.inside());
+  }
 }
 
 void LineWatch::hear(const Inside& inside) {

@@ -22,7 +22,7 @@ class LineWatch {
   // A record that was not acknowledged is told after a reset too.
   void on_restart(bool powered_off);
   // A byte that the board sent.
-  void on_byte(uint8_t wire);
+  void on_bytes(const uint8_t* wire, size_t size);
   // After the bytes of that step.
   void on_step(const Step& step);
 

@@ -104,7 +104,7 @@ void MotionWatch::on_step(const Step& step, const Pulses& output) {
   }
 
   // A hold that timed out needs no order but time.
-  const uint32_t held_frames = step.frame - heard_frame_;
+  const uint32_t held_frames = step.after.frame - heard_frame_;
   if (mode_ == Mode::kUnwinding && before == Mode::kHolding && !step.is(MessageType::kRelax)) {
     const uint16_t timeout_s = step.before.limits.hold_timeout_s;
     expect(timeout_s != 0 && held_frames >= timeout_s * 50u, "a hold lasts until its time is over");
@@ -119,7 +119,7 @@ void MotionWatch::on_step(const Step& step, const Pulses& output) {
 
 void MotionWatch::allow(const Step& step) {
   if (step.in_session() || step.after.session != step.before.session)
-    heard_frame_ = step.frame;
+    heard_frame_ = step.after.frame;
   if (step.after.session != step.before.session)
     stop_known_ = false;
   if (step.is(MessageType::kStop)) {

@@ -95,6 +95,20 @@ class ReferenceDecoder {
                                                                       : Found::kDamage;
   }
 
+  // Takes bytes up to the first that ends a frame, or all of them; returns how many.
+  size_t take(const uint8_t* wire, size_t size, Found& found) {
+    found = Found::kNothing;
+    const void* end = memchr(wire, 0, size);
+    const size_t count = end ? static_cast<size_t>(static_cast<const uint8_t*>(end) - wire) : size;
+    const size_t room = kWireMax - size_;
+    memcpy(stuffed_ + size_, wire, count < room ? count : room);
+    size_ += count < room ? count : room;
+    if (end == nullptr)
+      return count;
+    found = push(0);
+    return count + 1;
+  }
+
   const Inside& inside() const { return inside_; }
 
  private:

@@ -52,7 +52,7 @@ class Script {
 
   Bench& bench_;
   Input& input_;
-  uint32_t frames_left_ = 300;
+  uint32_t frames_left_ = 200;
   Twist twist_ = Twist::kNone;
   bool old_epoch_ = false;
   uint8_t next_session_ = 7;

@@ -11,6 +11,8 @@ using protocol::MessageType;
 namespace {
 
 bool equal(const protocol::SetLimits& left, const protocol::SetLimits& right) {
+  if (memcmp(&left, &right, sizeof(left)) == 0)
+    return true;
   uint8_t a[protocol::SetLimits::kSize];
   uint8_t b[protocol::SetLimits::kSize];
   encode(left, a);

@@ -11,6 +11,7 @@ namespace setae {
 // What of the board is not on the line at every moment.
 struct Snapshot {
   Mode mode;
+  uint32_t frame;  // the last that the board has begun
   uint8_t epoch;
   uint8_t session;
   uint8_t expected;
@@ -28,6 +29,7 @@ struct BoardProbe {
   static Snapshot look(const Board& board) {
     Snapshot shot = {};
     shot.mode = board.mode_;
+    shot.frame = board.now_.frame;
     shot.epoch = board.epoch_;
     shot.session = board.session_.id();
     shot.expected = board.session_.expected();
@@ -55,8 +57,7 @@ inline bool is_tripped(Mode mode) {
 struct Step {
   Snapshot before;
   Snapshot after;
-  uint32_t frame;    // at the end
-  bool frame_began;  // in this poll, or since the one before
+  bool frame_began;  // for the board: it may see a frame's begin a poll late
   bool delivered;    // a whole frame of a known type, in `host`
   Inside host;
   SensorReading reading;
