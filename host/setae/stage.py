@@ -13,7 +13,10 @@ import select
 import sys
 import termios
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import IO, Protocol, runtime_checkable
+
+import numpy as np
 
 from setae.config import Stage as Bounds
 from setae.errors import StageError
@@ -63,6 +66,48 @@ class Stage(Protocol):
     def poll(self, now_us: int) -> None:
         """Look at the stage at this time. Raises StageError once it has failed."""
         ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Move:
+    """A straight move that a stage can take.
+
+    Attributes
+    ----------
+    target_mm
+        Of frame D's origin in the world, (3,).
+    speed_mm_s, acceleration_mm_s2
+        Bounds.
+    """
+
+    target_mm: tuple[float, float, float]
+    speed_mm_s: float
+    acceleration_mm_s2: float
+
+
+def checked_move(
+    position_mm: Sequence[float],
+    speed_mm_s: float | None,
+    acceleration_mm_s2: float | None,
+    bounds: Bounds,
+) -> Move:
+    """Check what `Stage.move_to` was given; `bounds` stand in for None.
+
+    Raises
+    ------
+    StageError
+        A value is no good.
+    """
+    target = np.asarray(position_mm, dtype=np.float64)
+    if target.shape != (3,) or not np.isfinite(target).all():
+        raise StageError(f"The arm can't go to {position_mm}.", "Give three finite numbers, in mm.")
+    speed = bounds.speed_mm_s if speed_mm_s is None else speed_mm_s
+    acceleration = bounds.acceleration_mm_s2 if acceleration_mm_s2 is None else acceleration_mm_s2
+    for name, value in (("speed_mm_s", speed), ("acceleration_mm_s2", acceleration)):
+        if not (math.isfinite(value) and value > 0):
+            raise StageError(f"{name} is {value}.", "Give a positive number.")
+    x_mm, y_mm, z_mm = target.tolist()
+    return Move(target_mm=(x_mm, y_mm, z_mm), speed_mm_s=speed, acceleration_mm_s2=acceleration)
 
 
 # Beyond the time that speed and acceleration ask for, before a move counts as failed.

@@ -167,6 +167,8 @@ def test_a_protective_stop_in_mid_move_is_noticed(fake: FakeController) -> None:
         fake.tell("safety 3")
         with pytest.raises(ArmSafetyError, match="protective stop"):
             poll_until(stage, lambda: False)
+        stage.stop()
+        assert not stage.moving, "it braked for ever, as far as it told"
 
 
 @pytest.mark.parametrize(

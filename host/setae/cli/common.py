@@ -72,7 +72,7 @@ class Where:
     @property
     def url(self) -> str | None:
         """For `setae.rig.connect` and `setae.rig.open`."""
-        if self.simulated and self.port is not None:
+        if (self.sim or self.plugin is not None) and self.port is not None:
             raise InputError("--sim and --port exclude each other.", "Give one of them.")
         if self.plant is not None and not self.simulated:
             raise InputError("--plant names a simulated robot.", "Give --sim too.")
@@ -82,8 +82,8 @@ class Where:
 
     @property
     def simulated(self) -> bool:
-        """Whether the robot is the simulated one."""
-        return self.sim or self.plugin is not None
+        """Whether the robot is a simulated one, as also `--port avr://...` names."""
+        return self.sim or self.plugin is not None or "://" in (self.port or "")
 
     def load(self) -> Config:
         """The configuration."""

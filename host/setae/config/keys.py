@@ -102,6 +102,8 @@ _UNITS = {
     "s": "s",
     "hpa": "hPa",
     "n_m": "N·m",
+    "hz": "Hz",
+    "kg": "kg",
     "um": "µm",
     "n": "N",
 }

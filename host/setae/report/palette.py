@@ -17,7 +17,6 @@ TUBE = "#8fb0cc"
 CUBE = "#caa472"
 CONTACT = "#d4213d"
 CLEAR = "#cfe0ec"
-BAND = "#f4d9a8"
 PRESSURE = "#2b5c8a"
 AGREES = "#1f7a4d"
 HEAT = ("#2b7bba", "#58a892", "#e0b43c", "#e07b1a", "#d4213d")

@@ -109,7 +109,8 @@ def as_json(shown: Sequence[Run], studies: Sequence[Log] = ()) -> dict[str, Any]
         "causes": [asdict(effect) for study in studies for effect in causes.effects(study)],
         "paper": {group: asdict(row) for group, row in paper.validation().items()},
     }
-    return _finite(data)  # type: ignore[no-any-return]
+    finite: dict[str, Any] = _finite(data)
+    return finite
 
 
 def _finite(value: Any) -> Any:

@@ -267,14 +267,14 @@ class Rig:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        try:
-            if error is not None:
-                self._stop_stage(error)
-            self.robot.__exit__(kind, error, traceback)
-        finally:
-            # After it, so that the log holds how the robot was left.
-            self._close_log(error)
-            self._open.close()
+        with self._open:
+            try:
+                if error is not None:
+                    self._stop_stage(error)
+                self.robot.__exit__(kind, error, traceback)
+            finally:
+                # After it, so that the log holds how the robot was left.
+                self._close_log(error)
 
     def _stop_stage(self, error: BaseException) -> None:
         try:

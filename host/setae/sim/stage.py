@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Protocol
-
-import numpy as np
 
 from setae.config import Stage as Bounds
 from setae.errors import StageError
 from setae.sim.world import World
+from setae.stage import checked_move
 
 __all__ = ["Follower", "SimulatedStage"]
 
@@ -90,22 +88,10 @@ class SimulatedStage:
         StageError
             The arm is moving, or a value is no good.
         """
-        bounds = self._bounds
-        speed = bounds.speed_mm_s if speed_mm_s is None else speed_mm_s
-        acceleration = (
-            bounds.acceleration_mm_s2 if acceleration_mm_s2 is None else acceleration_mm_s2
-        )
-        target = np.asarray(position_mm, dtype=np.float64)
-        if target.shape != (3,) or not np.isfinite(target).all():
-            raise StageError(
-                f"The arm can't go to {position_mm}.", "Give three finite numbers, in mm."
-            )
-        for name, value in (("speed_mm_s", speed), ("acceleration_mm_s2", acceleration)):
-            if not (math.isfinite(value) and value > 0):
-                raise StageError(f"{name} is {value}.", "Give a positive number.")
+        move = checked_move(position_mm, speed_mm_s, acceleration_mm_s2, self._bounds)
         if self.moving:
             raise StageError("The arm is moving already.", "Wait for it, or stop it first.")
-        self._world.arm_move(target.tolist(), speed, acceleration)
+        self._world.arm_move(move.target_mm, move.speed_mm_s, move.acceleration_mm_s2)
 
     def stop(self) -> None:
         """Brake now; returns without waiting for rest."""

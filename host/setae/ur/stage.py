@@ -16,8 +16,6 @@ from types import TracebackType
 from typing import Final, Self
 from urllib.parse import urlsplit
 
-import numpy as np
-
 from setae.config import Config
 from setae.errors import (
     ArmBoxError,
@@ -26,6 +24,7 @@ from setae.errors import (
     InputError,
     StageError,
 )
+from setae.stage import checked_move
 from setae.ur.controller import ArmState, Controller, check
 from setae.ur.pose import WorldFrame
 from setae.ur.worker import Job, Worker
@@ -194,26 +193,16 @@ class UrStage:
         """
         if self._failure is not None:
             raise self._failure
-        bounds = self._config.stage
-        speed = bounds.speed_mm_s if speed_mm_s is None else speed_mm_s
-        acceleration = (
-            bounds.acceleration_mm_s2 if acceleration_mm_s2 is None else acceleration_mm_s2
-        )
-        target = np.asarray(position_mm, dtype=np.float64)
-        if target.shape != (3,) or not np.isfinite(target).all():
-            raise StageError(f"The arm can't go to {position_mm}.", "Give three numbers, in mm.")
-        for name, value in (("speed_mm_s", speed), ("acceleration_mm_s2", acceleration)):
-            if not (math.isfinite(value) and value > 0):
-                raise StageError(f"{name} is {value}.", "Give a positive number.")
+        move = checked_move(position_mm, speed_mm_s, acceleration_mm_s2, self._config.stage)
         if self.moving:
             raise StageError("The arm is moving already.", "Wait for it, or stop it first.")
-        self.require_reachable(target.tolist())
-        pose = [*self.base_mm(target.tolist()), *self._state.pose[3:]]
+        self.require_reachable(move.target_mm)
+        pose = [*self.base_mm(move.target_mm), *self._state.pose[3:]]
         job = self._worker.submit(
-            "a move", lambda: self._controller.move(pose, speed, acceleration)
+            "a move",
+            lambda: self._controller.move(pose, move.speed_mm_s, move.acceleration_mm_s2),
         )
-        x_mm, y_mm, z_mm = target.tolist()
-        self._move = _Move((x_mm, y_mm, z_mm), job)
+        self._move = _Move(move.target_mm, job)
 
     def stop(self) -> None:
         """Brake now; returns without waiting for rest.
@@ -227,7 +216,9 @@ class UrStage:
             raise ArmFrozenError("The arm can't be told to stop: its controller does not answer.")
         self._move = None
         deceleration = self._config.stage.acceleration_mm_s2
-        self._braking = self._worker.submit("a stop", lambda: self._controller.brake(deceleration))
+        braking = self._worker.submit("a stop", lambda: self._controller.brake(deceleration))
+        # Once the arm has failed, nobody looks at what becomes of it.
+        self._braking = braking if self._failure is None else None
 
     def poll(self, now_us: int) -> None:
         """Look at the arm; never waits.
