@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 from tests.system.test_explore_by_hand import board_at_a_port
 
 from setae import record, rig
-from setae.cli import main
+from setae.cli import errors_table, main
 from setae.cli.common import interrupts
 from setae.config import load
 from setae.experiments import causes, runs
@@ -194,6 +195,7 @@ def test_a_real_robot_waits_for_pictures_and_is_measured_by_a_file(
         (("--sim", "--resume"), "--out"),
         (("--sim", "--noise-mm", "-1"), "noise"),
         (("--positions", "a.csv", "--model", "paper", "--model", "taut"), "one --model"),
+        (("--positions", "a.csv", "--causes"), "--causes is for driving"),  # was passed over
     ],
 )
 def test_contradictions_are_told_in_one_line_before_anything_moves(
@@ -210,6 +212,16 @@ def test_contradictions_are_told_in_one_line_before_anything_moves(
     assert words in errors
     assert len(errors.splitlines()) == 1
     assert not (tmp_path / "runs").exists()
+
+
+def test_figures_are_whole_in_a_narrow_terminal() -> None:
+    """2.06±1.52 came out as 2.06±1…"""
+    target = paper_targets(load())[0]
+    table = errors_table._table([Pose(target, np.array(target.position_mm))])
+    narrow = Console(width=45)
+    with narrow.capture() as shown:
+        narrow.print(table)
+    assert "…" not in shown.get()
 
 
 def test_the_list_of_targets_is_a_table_that_can_be_filled_in(

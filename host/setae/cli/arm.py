@@ -36,7 +36,9 @@ def show_arm_targets(
     if stage is None:
         raise InputError("--dry-run looks at an arm.", "Give --stage ur://ADDRESS too.")
     outside = 0
-    table = Table("x, y, z from the start, mm", "in the arm's base frame, mm", "in the box")
+    table = Table()
+    for name in ("x, y, z from the start, mm", "in the arm's base frame, mm", "in the box"):
+        table.add_column(name, overflow="fold")
     with UrStage(stage, config) as arm:
         for target_mm in targets_mm:
             try:

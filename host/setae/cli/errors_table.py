@@ -51,7 +51,7 @@ def _table(poses: Sequence[Pose]) -> Table:
     theirs = paper.validation()
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
     for name in ("group", "n", "distance", "paper", "x or y", "z", "3D"):
-        table.add_column(name, justify="left" if name == "group" else "right")
+        table.add_column(name, justify="left" if name == "group" else "right", overflow="fold")
     for group, ours in by_group(poses).items():
         table.add_row(
             group,
@@ -70,7 +70,7 @@ def print_causes(effects: Sequence[why.Effect]) -> None:
     say("What each imperfection does to the mean error in the bending plane, in mm:")
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
     for name in ("cause", "alone", "adds", "all but it", "mending gains"):
-        table.add_column(name, justify="left" if name == "cause" else "right")
+        table.add_column(name, justify="left" if name == "cause" else "right", overflow="fold")
     table.add_row("none", f"{effects[0].none_mm:.2f}", "", "", "")
     for effect in effects:
         table.add_row(

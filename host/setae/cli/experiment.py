@@ -235,12 +235,12 @@ def _name(what: Obstacle | None) -> str:
 
 def _print_table(results: Sequence[ExploreResult], *, paper: bool) -> None:
     table = Table()
-    table.add_column("obstacle")
-    table.add_column("descent", justify="right")
+    table.add_column("obstacle", overflow="fold")
+    table.add_column("descent", justify="right", overflow="fold")
     if paper:
-        table.add_column("paper's descent", justify="right")
-    table.add_column("contacts", justify="right")
-    table.add_column("directions of contact")
+        table.add_column("paper's descent", justify="right", overflow="fold")
+    table.add_column("contacts", justify="right", overflow="fold")
+    table.add_column("directions of contact", overflow="fold")
     for result, theirs_mm in zip(
         results, PAPER_DESCENTS_MM if paper else [0.0] * len(results), strict=True
     ):

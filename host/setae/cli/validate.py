@@ -106,6 +106,12 @@ def validate_command(
         return
     noise = Noise(sd_mm=noise_mm, seed=noise_seed)
     if positions:
+        drives = {"--targets": targets is not None, "--noise-mm": noise.sd_mm != 0,
+                  "--causes": causes, "--resume": resume}  # fmt: skip
+        if given := [name for name, is_given in drives.items() if is_given]:
+            raise InputError(
+                f"{given[0]} is for driving, and --positions drives nothing.", "Leave one out."
+            )
         folder = _import(positions, frame, models, out, config, force=force)
     else:
         if frame is not None:

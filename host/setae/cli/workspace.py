@@ -57,8 +57,8 @@ def workspace(
 def _print(measured: Volumes, model: str) -> None:
     table = Table(title=f"Workspace of the spring's top, model {model}", title_justify="left")
     table.add_column("")
-    table.add_column("cm³", justify="right")
-    table.add_column("±", justify="right")
+    table.add_column("cm³", justify="right", overflow="fold")
+    table.add_column("±", justify="right", overflow="fold")
     rows = [("the spring alone", measured.spring)]
     rows += [
         (f"  lost to {name}", measured.lost[kind])
