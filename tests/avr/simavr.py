@@ -29,6 +29,7 @@ CYCLES_PER_TICK = CYCLES_PER_US // PULSE_TICKS_PER_US
 FRAME_CYCLES = SERVO_FRAME_US * CYCLES_PER_US
 _BIT_CYCLES = 1e6 * CYCLES_PER_US / BAUD
 _ROOM = 4096
+_TURN_ON_THE_SPOT = b"\xff\xcf"  # RJMP to itself
 # A Python program still sees Ctrl-C.
 _SLICE_US = 100_000
 
@@ -155,6 +156,10 @@ def _load() -> ctypes.CDLL:
         "uno_start": (None, [handle, ctypes.c_uint16]),
         "uno_eeprom_get": (ctypes.c_uint8, [handle, ctypes.c_uint16]),
         "uno_eeprom_set": (None, [handle, ctypes.c_uint16, ctypes.c_uint8]),
+        "uno_stop_switch_closed": (None, [handle, ctypes.c_int]),
+        "uno_hold_program": (None, [handle, cycle, cycle]),
+        "uno_program_counter": (ctypes.c_uint32, [handle]),
+        "uno_interrupts_on": (ctypes.c_int, [handle]),
         "uno_usb_chip": (None, [handle, ctypes.c_int]),
         "uno_sensor_ready_wired": (None, [handle, ctypes.c_int]),
         "uno_run": (None, [handle, cycle, ctypes.c_int]),
@@ -245,6 +250,22 @@ class Uno:
         """Reset as the button does, or a host that opens the port. RAM keeps its content."""
         self._library.uno_press_reset(self._handle)
 
+    def hold_program(self, from_cycle: int, cycles: int) -> None:
+        """Let the program stand still from then on, as in a section with interrupts off.
+
+        Timers, serial line and sensor go on. One hold at a time.
+        """
+        self._library.uno_hold_program(self._handle, from_cycle, cycles)
+
+    def hang(self) -> tuple[int, bytes]:
+        """Let the program turn on the spot, interrupts on. Returns what `load` mends it with."""
+        while not self._library.uno_interrupts_on(self._handle):
+            self.run_to(self.cycle + 1)
+        address = self._library.uno_program_counter(self._handle)
+        before = self.flash(address, len(_TURN_ON_THE_SPOT))
+        self.load(address, _TURN_ON_THE_SPOT)
+        return address, before
+
     # ---------------------------------------------------------------------------- power
 
     def cycle_power(self, *, torn: int = 0xA5) -> None:
@@ -279,7 +300,7 @@ class Uno:
         self.set_start(BOOT_START)
 
     def set_start(self, address: int) -> None:
-        """Start there now and after each reset, as the fuses tell a chip with a bootloader."""
+        """Start there at power-on and after each reset: the fuses of a chip with a bootloader."""
         self._library.uno_start(self._handle, address)
 
     def eeprom(self, address: int, size: int) -> bytes:
@@ -357,6 +378,10 @@ class Uno:
     def wire_data_ready(self, wired: bool = True) -> None:
         """Connect the sensor's data-ready pin to D2."""
         self._library.uno_sensor_ready_wired(self._handle, wired)
+
+    def close_stop_switch(self, closed: bool = True) -> None:
+        """Close the switch between D4 and ground, or open it, as it is where there is none."""
+        self._library.uno_stop_switch_closed(self._handle, closed)
 
     def stick_bus(self, clocks: int) -> None:
         """Let a slave hold SDA until it has seen that many clocks."""

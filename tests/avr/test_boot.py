@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import pytest
 from tests.avr.driver import Driver
-from tests.avr.simavr import AvrTransport, Uno
+from tests.avr.simavr import (
+    CYCLES_PER_TICK,
+    CYCLES_PER_US,
+    AvrTransport,
+    Uno,
+    by_servo,
+)
 
 from setae import __version__
+from setae.errors import BoardResetError
 from setae.link.session import Session
 from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, ResetCause, Sensor, State
 
@@ -50,3 +58,80 @@ def test_a_host_that_comes_back_finds_the_robot_holding(driver: Driver) -> None:
     again = Session(AvrTransport(driver.uno), session_id=9)
     again.open()
     assert again.state is State.HOLDING
+
+
+def test_a_loop_that_hangs_is_reset_and_says_so_and_its_last_pulses_are_whole(
+    driver: Driver,
+) -> None:
+    """The bootloader clears the reset flags: only the watchdog's own interrupt can tell."""
+    uno = driver.uno
+    uno.install_bootloader()
+    driver.enable(POSE)
+    driver.session.run_for(60_000)
+    resets = uno.statistics().resets
+    hung_at = uno.cycle
+    address, before = uno.hang()
+    while uno.statistics().resets == resets:
+        uno.run_for_us(1_000)
+    assert 240_000 < (uno.cycle - hung_at) / CYCLES_PER_US < 520_000
+    uno.load(address, before)
+    uno.run_for_us(300_000)
+
+    for servo, pulses in enumerate(by_servo(driver.pulses())):
+        assert {pulse.width for pulse in pulses} == {POSE[servo] * CYCLES_PER_TICK}
+        # From the watchdog's interrupt on there are none.
+        assert pulses[-1].rise < hung_at + 300_000 * CYCLES_PER_US
+    hello = Session(AvrTransport(uno), session_id=9).open()
+    assert hello.reset_cause == ResetCause.WATCHDOG
+    assert hello.pose_known == 1
+    assert hello.pulse_ticks == POSE
+
+
+def test_what_happened_is_read_through_the_reset_of_a_new_connection(driver: Driver) -> None:
+    """Opening the port pulls DTR, that resets the board, and the bootloader waits for a program."""
+    uno = driver.uno
+    uno.install_bootloader()
+    driver.enable(POSE)
+    driver.guard(15)
+    driver.session.run_for(400_000)
+    uno.set_pressure(1040.0)
+    driver.wait_for(State.TRIPPED)
+    driver.session.run_for(60_000)
+    last = driver.reports[-1].telemetry.pulse_ticks
+
+    uno.press_reset()
+    opened_at = uno.cycle
+    again = Driver(uno, session_id=9)
+    again.session.open()
+    again.session.run_for(100_000)
+
+    assert (uno.cycle - opened_at) / CYCLES_PER_US < 2_500_000
+    assert again.session.hello is not None
+    assert again.session.hello.pulse_ticks == last
+    assert [trip.record for trip in again.trips] == [driver.trips[-1].record]
+    assert again.trips[0].earlier
+    assert again.session.state is State.RELAXED
+    assert [edge for edge in uno.edges() if edge.cycle > opened_at + CYCLES_PER_US] == []
+
+
+def test_a_board_that_lost_its_power_knows_nothing_and_keeps_still(driver: Driver) -> None:
+    uno = driver.uno
+    driver.enable(POSE)
+    driver.guard(15, deadline_frames=10)
+    driver.wait_for(State.TRIPPED)
+    driver.session.run_for(60_000)
+    uno.edges()
+    uno.cycle_power()
+    with pytest.raises(BoardResetError, match="started anew"):
+        driver.session.run_for(5_000_000)
+
+    again = Driver(uno, session_id=9)
+    again.session.open()
+    again.session.run_for(100_000)
+    hello = again.session.hello
+    assert hello is not None
+    assert hello.reset_cause == ResetCause.POWER_ON
+    assert hello.pose_known == 0
+    assert again.trips == []
+    assert again.session.state is State.RELAXED
+    assert len(uno.edges()) <= 4, "the pulses that the cut ended"

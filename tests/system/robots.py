@@ -75,6 +75,13 @@ class Bench:
         else:
             self.uno.set_sensor_silent(silent)
 
+    def open_stop_switch(self, is_open: bool = True) -> None:
+        """Open or close the switch on D4."""
+        if self.uno is None:
+            self.world.stop_switch(is_open=is_open)
+        else:
+            self.uno.close_stop_switch(not is_open)
+
     def run_without_host(self, duration_s: float) -> None:
         """Let time pass with nobody listening."""
         end_us = self.line.now_us() + round(duration_s * 1e6)
@@ -134,10 +141,13 @@ def compressed(
     obstacle: Obstacle | None = None,
     down: Faults | None = None,
     up: Faults | None = None,
+    config: Config | None = None,
     back_end: str = "sim",
 ) -> Iterator[Bench]:
     """The same, enabled and compressed to 45 mm."""
-    with bench(seed=seed, obstacle=obstacle, down=down, up=up, back_end=back_end) as made:
+    with bench(
+        seed=seed, obstacle=obstacle, down=down, up=up, config=config, back_end=back_end
+    ) as made:
         # An UNO that was just switched on does not know its pose.
         made.robot.enable(accept_jump=True)
         made.robot.compress(45.0)

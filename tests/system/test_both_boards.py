@@ -8,7 +8,7 @@ from tests.avr.built import require_built
 from tests.system.robots import WALL_AHEAD, bench, compressed
 
 from setae.config import loads
-from setae.errors import BoardResetError, FaultError, StoppedError
+from setae.errors import BoardResetError, FaultError, RefusedError, StoppedError
 from setae.experiments.events import Event
 from setae.experiments.explore import explore
 from setae.link.lossy import Faults
@@ -46,8 +46,9 @@ def test_a_touch_stops_it_and_it_comes_back(back_end: str) -> None:
         made.robot.session.subscribe(lambda _: truths.append(made.world.truth()))
         contact = made.robot.probe(TARGET_MM, duration_s=1.0)
         assert contact is not None
-        touching = next(truth for truth in truths if truth.contact_depth_mm > 0)
-        assert abs(contact.time_us - touching.time_us) < 60_000
+        threshold_hpa = contact.baseline_hpa + made.robot.config.bristle.threshold_hpa
+        pressed = next(truth for truth in truths if truth.pressure_hpa > threshold_hpa)
+        assert abs(contact.time_us - pressed.time_us) < 40_000
         assert made.robot.state is State.HOLDING
         assert made.robot.telemetry.pulse_ticks == start
 
@@ -77,6 +78,33 @@ def test_a_silent_sensor_under_guard_is_a_fault(back_end: str) -> None:
         made.run(0.5)
         made.robot.resume()
         assert made.robot.state is State.HOLDING
+
+
+def test_an_open_stop_switch_stops_it_until_it_is_closed_and_resumed(back_end: str) -> None:
+    config = loads("[motion]\nstop_switch = 1")
+    with bench(config=config, back_end=back_end) as made:
+        robot = made.robot
+        with pytest.raises(RefusedError, match="switch"):
+            robot.resume()
+        made.open_stop_switch(False)
+        made.run(0.1)
+        robot.resume()
+        robot.enable(accept_jump=True)
+        opened_us = robot.now_us + 300_000
+        made.at(opened_us, made.open_stop_switch)
+        with pytest.raises(StoppedError):
+            robot.move_to((0.0, 0.0, 60.0), duration_s=1.5)
+        assert robot.now_us < opened_us + 60_000
+        made.run(0.06)
+        held = made.pulses_us()
+        made.run(0.3)
+        assert made.pulses_us() == pytest.approx(held)
+        with pytest.raises(RefusedError, match="switch"):
+            robot.resume()
+        made.open_stop_switch(False)
+        made.run(0.1)
+        robot.resume()
+        assert robot.state is State.HOLDING
 
 
 def test_a_reset_in_mid_move_is_noticed_and_nothing_goes_on(back_end: str) -> None:

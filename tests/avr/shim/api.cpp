@@ -172,6 +172,22 @@ void uno_sensor_ready_wired(Uno* uno, int wired) {
   uno->d2().set_wired(wired != 0);
 }
 
+void uno_stop_switch_closed(Uno* uno, int closed) {
+  uno->d2().set_switch_closed(closed != 0);
+}
+
+void uno_hold_program(Uno* uno, uint64_t from, uint64_t duration) {
+  uno->hold_program(from, duration);
+}
+
+uint32_t uno_program_counter(Uno* uno) {
+  return uno->program_counter();
+}
+
+int uno_interrupts_on(Uno* uno) {
+  return uno->interrupts_on();
+}
+
 void uno_usb_chip(Uno* uno, int present) {
   uno->usb().set_present(present != 0);
 }

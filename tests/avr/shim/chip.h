@@ -39,6 +39,8 @@ class Chip {
 
   Cycle cycle() const { return avr_->cycle; }
   bool crashed() const { return avr_->state == cpu_Crashed || avr_->state == cpu_Done; }
+  uint32_t program_counter() const { return avr_->pc; }
+  bool interrupts_on() const { return avr_->sreg[S_I] != 0; }
   // Data space addresses, as in the data sheet's register summary (in parentheses there).
   uint8_t get(uint16_t address) const { return avr_->data[address]; }
   void set(uint16_t address, uint8_t value) { avr_->data[address] = value; }

@@ -16,6 +16,7 @@ constexpr uint16_t kEimsk = 0x3D;
 constexpr uint16_t kEicra = 0x69;
 
 constexpr uint8_t kBit = 1 << 2;
+constexpr uint8_t kSwitchBit = 1 << 4;
 constexpr uint8_t kFlag = 1 << 0;
 constexpr uint8_t kSense = 3;
 constexpr uint8_t kAnyEdge = 1;
@@ -26,8 +27,11 @@ constexpr uint8_t kRising = 3;
 
 Input::Input(Chip& chip) : chip_(chip), vector_(chip.external().eint[0].vector) {
   chip_.on_read(kPinD, [this] {
-    const uint8_t others = static_cast<uint8_t>(chip_.get(kDdrD) & chip_.get(kPortD) & ~kBit);
-    return static_cast<uint8_t>(others | (level() ? kBit : 0));
+    const uint8_t driven = chip_.get(kDdrD), port = chip_.get(kPortD);
+    // Open it is pulled up, where the program has asked for that.
+    const uint8_t pulled = switch_closed_ ? 0 : kSwitchBit;
+    const uint8_t levels = static_cast<uint8_t>(port & (driven | pulled) & ~kBit);
+    return static_cast<uint8_t>(levels | (level() ? kBit : 0));
   });
   chip_.on_write(kEicra, [this](uint8_t value) { chip_.set(kEicra, value); });
   chip_.on_write(kEimsk, [this](uint8_t value) {

@@ -44,7 +44,8 @@ Uno::Uno(const std::string& elf_path)
       eeprom_(chip_),
       adc_(chip_),
       flash_(chip_),
-      end_(chip_, [](Cycle) {}) {
+      end_(chip_, [](Cycle) {}),
+      hold_(chip_, [this](Cycle) { chip_.avr()->cycle += hold_cycles_; }) {
   avr_t* avr = chip_.avr();
   listener_.uno = this;
   listener_.io.kind = "uno";
@@ -147,7 +148,13 @@ void Uno::load(uint16_t address, const uint8_t* data, size_t size) {
 
 void Uno::set_start(uint16_t address) {
   chip_.avr()->reset_pc = address;
-  chip_.avr()->pc = address;
+  if (chip_.cycle() == 0)
+    chip_.avr()->pc = address;
+}
+
+void Uno::hold_program(Cycle from, Cycle duration) {
+  hold_cycles_ = duration;
+  hold_.set(from);
 }
 
 void Uno::on_running(avr_irq_t*, uint32_t running, void* entry) {

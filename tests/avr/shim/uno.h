@@ -42,6 +42,9 @@ class Uno {
   void load(uint16_t address, const uint8_t* data, size_t size);
   // Where a reset goes to: the fuse BOOTRST and the size of the bootloader.
   void set_start(uint16_t address);
+  // From that cycle on the program stands still for a time, as in a section with interrupts off;
+  // everything else on the chip goes on.
+  void hold_program(Cycle from, Cycle duration);
   // Until that cycle, or until the board has sent a byte of 0: a whole frame.
   void run(Cycle end, bool stop_after_frame);
 
@@ -50,7 +53,7 @@ class Uno {
   Eeprom& eeprom() { return eeprom_; }
   Adc& adc() { return adc_; }
   Flash& flash() { return flash_; }
-  // Where the sensor's data-ready pin goes, if it is wired.
+  // D2 and D4: the sensor's data-ready pin and the stop switch, where they are wired.
   Input& d2() { return d2_; }
   Lps33hw& sensor() { return sensor_; }
   Twi& twi() { return twi_; }
@@ -64,6 +67,9 @@ class Uno {
   uint32_t longest_off_at() const { return longest_off_at_; }
   // Deepest stack since power-on.
   int stack_bytes() const;
+  // The next instruction, in bytes, and whether it may be interrupted.
+  uint32_t program_counter() const { return chip_.program_counter(); }
+  bool interrupts_on() const { return chip_.interrupts_on(); }
   // The program did what no part does: simavr gave up.
   bool crashed() const { return chip_.crashed(); }
   int resets() const { return resets_; }
@@ -107,6 +113,8 @@ class Uno {
   Listener listener_ = {};
   std::vector<std::unique_ptr<Vector>> vectors_;
   Alarm end_;
+  Alarm hold_;
+  Cycle hold_cycles_ = 0;
   Cycle run_end_ = 0;
   bool watching_ = false;
   bool was_off_ = false;

@@ -15,8 +15,9 @@
 // Timer2 equals the low byte of Timer1. Timer0 counts 32 of their ticks at a time, which is exact
 // enough to wake by.
 //
-// A handler arms an edge and never makes one. What comes too late even for that is counted, and
-// leaves a pulse out, or ends it, rather than letting it run on.
+// A handler arms an edge and never makes one. One that comes late is counted. Too late for the rise
+// it leaves the frame's pulses out; after that pulses stay whole as long as their fall can still be
+// armed, and are ended at once where it can't.
 
 namespace setae {
 namespace servo_pulses {
@@ -32,6 +33,10 @@ constexpr uint16_t kRise = 120;
 constexpr uint16_t kTimer0Ticks = 32;
 constexpr uint16_t kFallAhead = 180;
 constexpr uint16_t kFallAheadMost = kFallAhead + 2 * kTimer0Ticks;
+// So long after the rise the falls can still be armed.
+constexpr uint16_t kLatestFallTicks = 600;
+static_assert(kLatestFallTicks + kFallAheadMost + kWorkTicks < protocol::kPulseTicksAbsoluteMin,
+              "the shortest pulse would be over");
 static_assert(kRise > kLateTicks + kWorkTicks, "an edge must be armed before it is due");
 static_assert(kFallAhead > kLateTicks + kWorkTicks, "an edge must be armed before it is due");
 static_assert(kRise < 256 && kFallAheadMost < 256, "Timer2 would match too early");
@@ -181,7 +186,8 @@ ISR(TIMER1_COMPA_vect) {
   using namespace setae::servo_pulses;
   const uint16_t woke = OCR1A;
   const uint8_t now_step = step;
-  const bool on_time = static_cast<uint16_t>(TCNT1 - woke) <= kLateTicks;
+  const uint16_t waited = TCNT1 - woke;
+  const bool on_time = waited <= kLateTicks;
   step = now_step + 1;
   if (now_step == 0) {  // woke at F
     frame_start = woke;
@@ -200,10 +206,15 @@ ISR(TIMER1_COMPA_vect) {
     ++late;
   } else if (now_step == 1) {  // all four are up
     TCCR1A = kLower1;
-    if (on_time) {
+    uint8_t wait = current->wait;
+    if (!on_time) {
+      ++late;
+      wait -= static_cast<uint8_t>(waited / kTimer0Ticks + 1);
+    }
+    if (waited <= kLatestFallTicks) {
       OCR1A = frame_start + current->end[0];
       OCR1B = frame_start + current->end[1];
-      OCR0B = static_cast<uint8_t>(TCNT0 + current->wait);
+      OCR0B = static_cast<uint8_t>(TCNT0 + wait);
       TIFR0 = _BV(OCF0B);
       TIMSK0 |= _BV(OCIE0B);
       return;
@@ -211,7 +222,6 @@ ISR(TIMER1_COMPA_vect) {
     TCCR2A = kLower2;
     TCCR1C = _BV(FOC1A) | _BV(FOC1B);
     TCCR2B |= _BV(FOC2A) | _BV(FOC2B);
-    ++late;
   }  // else servo 0's pulse is over
   step = 0;
   OCR1A = frame_start + kFrameTicks;
