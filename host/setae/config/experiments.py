@@ -63,6 +63,8 @@ class Scan(Section):
         How much lower than the surface a contact is estimated; added to every height.
     slip_hpa
         A rise of pressure that falls back by as much before the contact is a slip.
+    seek_speed_mm_s
+        Adaptive: of the tip, beyond where a surface is expected.
     coarse_mm
         Adaptive: anything this wide is found.
     flat_mm
@@ -81,6 +83,7 @@ class Scan(Section):
     clearance_mm: float = key(low=1, high=1000)
     contact_depth_mm: float = key(low=-100, high=100)
     slip_hpa: float = key(low=0.1, high=1000)
+    seek_speed_mm_s: float = key(low=0.1, high=5000)
     coarse_mm: float = key(low=0.5, high=2000)
     flat_mm: float = key(low=0, high=1000)
 

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from setae.config import Scan
-from setae.experiments.scan.cycles import NOTHING, Found, known_to_be_there
+from setae.experiments.scan.cycles import NOTHING, Found, feel_short, known_to_be_there
 from setae.experiments.scan.steps import Feeling, Steps
 from setae.experiments.scan.survey import Cell, Survey
 
@@ -41,9 +41,12 @@ def coarse_rows(survey: Survey, settings: Scan) -> list[int]:
     >>> coarse_rows(Survey(load().scan), load().scan)
     [0, 3, 6, 9, 12, 15, 18, 20]
     """
-    spacing = max(1, math.floor(settings.coarse_mm / settings.step_mm + 1e-6))
     last = survey.rows - 1
-    return [*range(0, last, spacing), last]
+    return [*range(0, last, _spacing(settings)), last]
+
+
+def _spacing(settings: Scan) -> int:
+    return max(1, math.floor(settings.coarse_mm / settings.step_mm + 1e-6))
 
 
 class _Tracer:
@@ -52,6 +55,7 @@ class _Tracer:
         self._survey = survey
         self._settings = settings
         self._found = found
+        self._rows_between = _spacing(settings)
 
     # ------------------------------------------------------------------------- a row
 
@@ -75,15 +79,20 @@ class _Tracer:
         while run < len(left) and abs(left[run] - left[run - 1]) == 1:
             run += 1
         passed = 0
+        around_mm = self._heights_around(left[0], left[run - 1], row, self._rows_between)
         for end in (0, run - 1):
-            contact = self._steps.go(self._survey.x_mm(left[end]), self._survey.y_mm(row))
-            passed = end + 1 if contact is None else self._passed(left[:end])
-            if contact is not None:
+            touched = self._steps.go(
+                self._survey.x_mm(left[end]),
+                self._survey.y_mm(row),
+                retract_to_mm=self._length_over(max(around_mm, default=math.nan)),
+            )
+            passed = self._passed(left[:end]) if touched else end + 1
+            if touched:
                 break
         for column in left[:passed]:
             self._found((column, row), NOTHING)
         left = left[passed:]
-        return left if contact is None else self._touch(left, row, beside=True)
+        return self._touch(left, row, beside=True) if touched else left
 
     def _passed(self, run: Sequence[int]) -> int:
         """How many places of a row the arm left well behind before it was stopped."""
@@ -95,32 +104,37 @@ class _Tracer:
         return sum(abs(self._survey.x_mm(column) - begin_mm) < way_mm for column in run)
 
     def _touch(self, left: list[int], row: int, *, beside: bool = False) -> list[int]:
-        """Feel at the next place, and where it may be so, at the next but one; what is left."""
-        first = (left[0], row)
-        feeling = self._visit(first)
-        self._found(first, known_to_be_there(feeling) if beside else feeling)
-        left = left[1:]
-        if feeling.mark != "felt" or len(left) < 2 or not self._may_skip(first, left):
-            return left
-        between, second = (left[0], row), (left[1], row)
-        further = self._visit(second)
-        self._found(second, further)
-        if further.mark == "felt" and self._flat(feeling.height_mm, further.height_mm):
-            self._infer(between, (feeling.height_mm + further.height_mm) / 2)
+        """Feel at the next place, or where it may be so, at the next but one; what is left."""
+        here = (left[0], row)
+        further = (left[1], row) if len(left) > 1 else here
+        if beside or not self._may_skip(left, row):
+            feeling = self._visit(here)
+            self._found(here, known_to_be_there(feeling) if beside else feeling)
+            return left[1:]
+        feeling = self._visit(further)
+        self._found(further, feeling)
+        behind_mm = self._survey.height_mm((2 * left[0] - left[1], row))
+        if feeling.mark == "felt" and self._flat(behind_mm, feeling.height_mm):
+            self._infer(here, (behind_mm + feeling.height_mm) / 2)
+        elif self._steps.extended:
+            # Back as it is: a contact tells that the object reaches so far.
+            self._sweep([left[0]], row)
         else:
-            self._found(between, self._visit(between))
+            self._found(here, self._visit(here))
         return left[2:]
 
-    def _may_skip(self, here: Cell, left: Sequence[int]) -> bool:
-        """Whether the place after this one will follow from its neighbours."""
-        column, row = here
-        if abs(left[0] - column) != 1 or abs(left[1] - column) != 2:
+    def _may_skip(self, left: Sequence[int], row: int) -> bool:
+        """Whether the next place will follow from those beside it, as far as can be told."""
+        if len(left) < 2:
             return False
-        behind = self._survey.height_mm((2 * column - left[0], row))
-        if math.isfinite(behind) and not self._flat(behind, self._survey.height_mm(here)):
+        forward = left[1] - left[0]
+        if abs(forward) != 1:
+            return False
+        behind = [self._survey.height_mm((left[0] - part * forward, row)) for part in (1, 2)]
+        if not (math.isfinite(behind[0]) and self._flat(*behind)):
             return False
         for beside in (row - 1, row + 1):
-            cells = [(other, beside) for other in (column, left[0], left[1])]
+            cells = [(left[0] + part * forward, beside) for part in (-1, 0, 1)]
             if any(self._survey.get(cell) is None for cell in cells):
                 continue
             heights = [self._survey.height_mm(cell) for cell in cells]
@@ -134,10 +148,26 @@ class _Tracer:
         """Go there no lower than is safe, and feel."""
         steps = self._steps
         place_mm = self._survey.x_mm(cell[0]), self._survey.y_mm(cell[1])
-        top_mm = self._top_mm(cell)
-        if math.isfinite(top_mm):
-            steps.retract(steps.length_over_mm(top_mm))
-        feeling = None if steps.extended else steps.go_and_feel(*place_mm)
+        around_mm = self._heights_around(cell[0], cell[0], cell[1], 1)
+        top_mm = max([*around_mm, self._top_mm(cell)], key=_nan_low)
+        steps.retract(min(self._length_over(top_mm), steps.length_mm))
+        feeling = None
+        if not (steps.extended or math.isnan(top_mm)):
+            near_mm = 2 * self._settings.clearance_mm
+            if around_mm:
+                near_mm += top_mm - min(around_mm)
+            unlikely = self._nothing_beside(cell)
+            feeling = steps.go_and_feel(*place_mm, near_mm=0.0 if unlikely else near_mm)
+            if feeling is None and not steps.short:
+                # Higher than what is known around it: once more, from farther up.
+                steps.retract(
+                    max(steps.short_mm, steps.length_mm - 3 * self._settings.clearance_mm)
+                )
+                feeling = steps.go_and_feel(*place_mm)
+            elif unlikely and feeling is not None and feeling.contact is not None:
+                # Touched in haste: measure it.
+                steps.lower(steps.length_over_mm(feeling.height_mm))
+                feeling = steps.feel(near_mm=near_mm)
         if feeling is None:
             steps.retract()
             feeling = steps.go_and_feel(*place_mm)
@@ -145,10 +175,35 @@ class _Tracer:
         if feeling.mark == "double":
             # In touch at once: from farther up it is seen whether it is so.
             steps.retract()
-            feeling = steps.feel()
+            feeling = feel_short(steps)
         if feeling.contact is not None:
             steps.lower(steps.length_over_mm(feeling.height_mm))
         return feeling
+
+    def _length_over(self, top_mm: float) -> float:
+        """Longest spring that clears a surface; the shortest where none is known."""
+        if math.isnan(top_mm):
+            return self._steps.short_mm
+        return self._steps.length_over_mm(top_mm)
+
+    def _heights_around(self, first: int, last: int, row: int, reach: int) -> list[float]:
+        """Known heights on a part of a row and around it."""
+        first, last = min(first, last), max(first, last)
+        heights_mm = [
+            self._survey.height_mm((column, other))
+            for other in range(row - reach, row + reach + 1)
+            for column in range(first - 1, last + 2)
+        ]
+        return [height_mm for height_mm in heights_mm if math.isfinite(height_mm)]
+
+    def _nothing_beside(self, cell: Cell) -> bool:
+        """Whether nothing is at the same place of a row beside."""
+        column, row = cell
+        for other in (row - 1, row + 1):
+            beside = self._survey.get((column, other))
+            if beside is not None and math.isnan(beside.height_mm):
+                return True
+        return False
 
     def _known_above(self, column: int, row: int) -> bool:
         """Whether something is known to stand between the arm and a place, or on it."""
@@ -180,27 +235,23 @@ class _Tracer:
             if self._survey.get(cell) is not None:
                 continue
             heights = [self._survey.height_mm((column, other)) for other in (below, above)]
-            if self._edge((column, below)) or self._edge((column, above)):
+            if not self._same_around(column, below, above):
                 left.append(column)
-            elif all(map(math.isfinite, heights)) and self._flat(*heights):
+            elif math.isfinite(heights[0]):
                 part = (row - below) / (above - below)
                 self._infer(cell, heights[0] + part * (heights[1] - heights[0]))
-            elif not any(map(math.isfinite, heights)):
-                self._infer(cell, math.nan)
             else:
-                left.append(column)
+                self._infer(cell, math.nan)
         return left
 
-    def _edge(self, cell: Cell) -> bool:
-        """Whether the surface changes beside a place of a row."""
-        column, row = cell
-        height_mm = self._survey.height_mm(cell)
-        for other in (column - 1, column + 1):
-            if 0 <= other < self._survey.columns:
-                beside_mm = self._survey.height_mm((other, row))
-                if math.isfinite(height_mm) != math.isfinite(beside_mm):
-                    return True
-        return False
+    def _same_around(self, column: int, below: int, above: int) -> bool:
+        """Whether two rows agree at a column and on both sides of it."""
+        return all(
+            self._flat(
+                self._survey.height_mm((other, below)), self._survey.height_mm((other, above))
+            )
+            for other in (column - 1, column, column + 1)
+        )
 
     def _flat(self, one_mm: float, other_mm: float) -> bool:
         if math.isnan(one_mm) or math.isnan(other_mm):

@@ -22,14 +22,16 @@ def paper(steps: Steps, survey: Survey, order: str, found: Found) -> None:
     """
     steps.retract()
     for cell in order_of(survey, order):
+        x_mm, y_mm = survey.x_mm(cell[0]), survey.y_mm(cell[1])
         extended = steps.extended
-        touched = steps.go(survey.x_mm(cell[0]), survey.y_mm(cell[1]))
-        if extended and touched is None:
+        touched = steps.go(x_mm, y_mm)
+        if extended and not touched:
             found(cell, NOTHING)
             continue
-        if touched is not None:
-            steps.go(survey.x_mm(cell[0]), survey.y_mm(cell[1]))
-        found(cell, known_to_be_there(steps.feel()) if touched else steps.feel())
+        if touched:
+            steps.go(x_mm, y_mm)
+        feeling = feel_short(steps)
+        found(cell, known_to_be_there(feeling) if touched else feeling)
 
 
 def safe(steps: Steps, survey: Survey, order: str, found: Found) -> None:
@@ -37,7 +39,14 @@ def safe(steps: Steps, survey: Survey, order: str, found: Found) -> None:
     for cell in order_of(survey, order):
         steps.retract()
         steps.go(survey.x_mm(cell[0]), survey.y_mm(cell[1]))
-        found(cell, steps.feel())
+        found(cell, feel_short(steps))
+
+
+def feel_short(steps: Steps) -> Feeling:
+    """Extend from the shortest; the bristle can't be in touch before."""
+    feeling = steps.feel()
+    assert feeling is not None, "a refusal of the short robot is an error"
+    return feeling
 
 
 def order_of(survey: Survey, order: str) -> list[Cell]:

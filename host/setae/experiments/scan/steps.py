@@ -10,7 +10,7 @@ from typing import Any
 from setae import kinematics, workspace
 from setae.config import Config
 from setae.contact import Contact
-from setae.errors import HeightWindowError
+from setae.errors import HeightWindowError, RefusedError
 from setae.experiments.events import Event, OnEvent
 from setae.link.events import Event as LinkEvent
 from setae.link.events import TelemetryReceived
@@ -25,6 +25,8 @@ _HERE_MM = 0.02
 # Shorter differences of length are not worth a move of the spring.
 _SAME_LENGTH_MM = 0.3
 _WORTH_LOWERING_MM = 3.0
+# The board's reason where the pressure at rest is not what it is without a contact.
+_IN_TOUCH = "tare_far"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,10 +176,20 @@ class Steps:
         if way_mm > _WORTH_LOWERING_MM:
             self._robot.compress(length_mm, speed_mm_s=self._settings.retract_speed_mm_s)
 
-    def go(self, x_mm: float, y_mm: float) -> Contact | None:
+    def go(self, x_mm: float, y_mm: float, *, retract_to_mm: float | None = None) -> bool:
         """Take the arm to a place with the bristle watching.
 
         On a contact the board makes the robot short by itself, and the arm stops where it is.
+
+        Parameters
+        ----------
+        retract_to_mm
+            The length after a contact; None: the least.
+
+        Returns
+        -------
+        bool
+            Whether something was touched.
 
         Raises
         ------
@@ -185,36 +197,54 @@ class Steps:
             The robot is short already: what it touched is too high to be stepped over.
         """
         if self._is_here(x_mm, y_mm):
-            return None
+            return False
         approach = self._approach(x_mm, y_mm)
-        contact = self._robot.hold_guarded(
-            approach.begin,
-            approach.busy,
-            approach.abort,
-            timeout_s=approach.timeout_s,
-            retract_mm=None if self.short else (0.0, 0.0, self.short_mm),
-        )
+        retract_mm = self.short_mm if retract_to_mm is None else retract_to_mm
+        try:
+            contact = self._robot.hold_guarded(
+                approach.begin,
+                approach.busy,
+                approach.abort,
+                timeout_s=approach.timeout_s,
+                retract_mm=None if self.short else (0.0, 0.0, min(retract_mm, self.length_mm)),
+            )
+        except RefusedError as refusal:
+            self._in_touch(refusal)
+            return True
         if contact is not None:
             self._stopped(contact)
-        return contact
+        return contact is not None
 
-    def feel(self) -> Feeling:
+    def feel(self, *, near_mm: float | None = None) -> Feeling | None:
         """Extend to the full length or the first contact.
 
         After a contact the robot is as long as before, otherwise extended.
-        """
-        return self._feel(None)
 
-    def go_and_feel(self, x_mm: float, y_mm: float) -> Feeling | None:
+        Parameters
+        ----------
+        near_mm
+            How far down the surface is expected; from there on the robot extends faster.
+            None: nobody knows.
+
+        Returns
+        -------
+        Feeling or None
+            None where the bristle was in touch before: the robot is short now.
+        """
+        return self._feel(None, near_mm)
+
+    def go_and_feel(
+        self, x_mm: float, y_mm: float, *, near_mm: float | None = None
+    ) -> Feeling | None:
         """`go` and `feel` under one watch, which saves a baseline.
 
         Returns
         -------
         Feeling or None
-            None after a contact on the way: arm and robot stay where they were then.
+            None after a contact on the way: the arm has stopped there.
         """
         if self._is_here(x_mm, y_mm):
-            return self._feel(None)
+            return self._feel(None, near_mm)
         aborted = False
         approach = self._approach(x_mm, y_mm)
 
@@ -223,21 +253,34 @@ class Steps:
             aborted = True
             approach.abort()
 
-        feeling = self._feel(dataclasses.replace(approach, abort=abort))
+        feeling = self._feel(dataclasses.replace(approach, abort=abort), near_mm)
         if not aborted:
             return feeling
+        assert feeling is not None
         assert feeling.contact is not None, "an approach ends early by a contact"
         self._stopped(feeling.contact)
         return None
 
-    def _feel(self, approach: Approach | None) -> Feeling:
-        begin_mm = self.length_mm
+    def _feel(self, approach: Approach | None, near_mm: float | None) -> Feeling | None:
+        begin_mm = min(max(self.length_mm, self.short_mm), self.long_mm)
+        slow_mm = self.long_mm if near_mm is None else min(begin_mm + near_mm, self.long_mm)
+        settings = self._settings
+        stages = [(slow_mm, settings.extend_speed_mm_s), (self.long_mm, settings.seek_speed_mm_s)]
+        contact = None
         self._watch.begin()
-        contact = self._robot.probe(
-            (0.0, 0.0, self.long_mm),
-            speed_mm_s=self._settings.extend_speed_mm_s,
-            approach=approach,
-        )
+        try:
+            for target_mm, speed_mm_s in stages:
+                if target_mm - self.length_mm > _SAME_LENGTH_MM and contact is None:
+                    contact = self._robot.probe(
+                        (0.0, 0.0, target_mm),
+                        speed_mm_s=speed_mm_s,
+                        retract_mm=(0.0, 0.0, begin_mm),
+                        approach=approach,
+                    )
+                    approach = None
+        except RefusedError as refusal:
+            self._in_touch(refusal)
+            return None
         slipped = self._watch.fell_hpa() > self._settings.slip_hpa
         if contact is None:
             return Feeling(mark="lost" if slipped else "empty", height_mm=math.nan, contact=None)
@@ -248,6 +291,13 @@ class Steps:
         elif slipped:
             mark = "slipped"
         return Feeling(mark=mark, height_mm=self.position_mm[2] - tip_mm, contact=contact)
+
+    def _in_touch(self, refusal: RefusedError) -> None:
+        """After a refused baseline: too little pressure for a contact, too much for none."""
+        if refusal.reason != _IN_TOUCH or self.short:
+            raise refusal
+        self.emit("in_touch", position_mm=list(self.position_mm), length_mm=self.length_mm)
+        self.retract()
 
     def _is_here(self, x_mm: float, y_mm: float) -> bool:
         return math.dist(self.position_mm[:2], (x_mm, y_mm)) < _HERE_MM
