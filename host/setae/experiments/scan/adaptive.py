@@ -17,6 +17,9 @@ from setae.experiments.scan.cycles import NOTHING, Found, feel_short, known_to_b
 from setae.experiments.scan.steps import Feeling, Steps
 from setae.experiments.scan.survey import Cell, Survey
 
+# Columns per row of the lines along which rows are compared.
+_SLOPES = (-1, 0, 1)
+
 
 def adaptive(steps: Steps, survey: Survey, settings: Scan, found: Found) -> None:
     """Trace rows `coarse_mm` apart, and between them what these leave open."""
@@ -228,30 +231,38 @@ class _Tracer:
     # --------------------------------------------------------------------- inference
 
     def unsettled(self, row: int, below: int, above: int) -> list[int]:
-        """Infer a row where the two beside it agree; columns where they don't."""
+        """Infer a row from those on both sides of it; columns where they leave it open."""
         left = []
         for column in range(self._survey.columns):
             cell = (column, row)
-            if self._survey.get(cell) is not None:
-                continue
-            heights = [self._survey.height_mm((column, other)) for other in (below, above)]
-            if not self._same_around(column, below, above):
-                left.append(column)
-            elif math.isfinite(heights[0]):
-                part = (row - below) / (above - below)
-                self._infer(cell, heights[0] + part * (heights[1] - heights[0]))
-            else:
-                self._infer(cell, math.nan)
+            if self._survey.get(cell) is None:
+                height_mm = self._between(cell, below, above)
+                if height_mm is None:
+                    left.append(column)
+                else:
+                    self._infer(cell, height_mm)
         return left
 
-    def _same_around(self, column: int, below: int, above: int) -> bool:
-        """Whether two rows agree at a column and on both sides of it."""
-        return all(
-            self._flat(
-                self._survey.height_mm((other, below)), self._survey.height_mm((other, above))
-            )
-            for other in (column - 1, column, column + 1)
-        )
+    def _between(self, cell: Cell, below: int, above: int) -> float | None:
+        """Height that two rows leave no doubt of, NaN for nothing; None where they do.
+
+        An edge that runs aslant is elsewhere in every row. So lines of several directions are
+        drawn through the place, and each that ends on the same surface in both rows votes for it.
+        """
+        column, row = cell
+        part = (row - below) / (above - below)
+        votes_mm = []
+        for slope in _SLOPES:
+            ends = (column - slope * (row - below), below), (column + slope * (above - row), above)
+            if all(0 <= end[0] < self._survey.columns for end in ends):
+                low_mm, high_mm = (self._survey.height_mm(end) for end in ends)
+                if self._flat(low_mm, high_mm):
+                    votes_mm.append(low_mm + part * (high_mm - low_mm))
+                elif math.isfinite(low_mm) and math.isfinite(high_mm):
+                    return None  # something, and nobody knows how high
+        if votes_mm and all(self._flat(votes_mm[0], vote_mm) for vote_mm in votes_mm):
+            return votes_mm[len(votes_mm) // 2]
+        return None
 
     def _flat(self, one_mm: float, other_mm: float) -> bool:
         if math.isnan(one_mm) or math.isnan(other_mm):
