@@ -16,7 +16,15 @@ from setae.config import Config
 from setae.errors import InputError
 from setae.solids import Box, Ellipsoid, Point, Prism, Ring, Solid
 
-__all__ = ["SHAPES", "ScanObject", "TableScene", "random_object", "table_scene"]
+__all__ = [
+    "SHAPES",
+    "ScanObject",
+    "TableScene",
+    "UnknownScene",
+    "of_description",
+    "random_object",
+    "table_scene",
+]
 
 SCALE_MIN, SCALE_MAX = 0.8, 1.2
 
@@ -269,3 +277,45 @@ def table_scene(config: Config, what: ScanObject | None = None) -> TableScene:
     tallest_mm = what.height_mm if what else 0.0
     over_object_mm = tallest_mm + geometry.min_length_mm + geometry.tip_offset_mm + _CLEARANCE_MM
     return TableScene(table_z_mm=-max(lowest_mm, over_object_mm), object=what)
+
+
+def of_description(scene: Mapping[str, Any]) -> TableScene:
+    """Make the scene again from what a log says of it.
+
+    Parameters
+    ----------
+    scene
+        `TableScene.describe` wrote it, under ``scene``.
+
+    Raises
+    ------
+    InputError
+        It describes no table.
+
+    Examples
+    --------
+    >>> scene = TableScene(table_z_mm=-138.0, object=ScanObject(shape="coil"))
+    >>> of_description(scene.describe()["scene"]) == scene
+    True
+    """
+    what = scene.get("object")
+    try:
+        return TableScene(
+            table_z_mm=float(scene["table_z_mm"]),
+            object=None if what is None else ScanObject(**what),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"A scene can't be made of {dict(scene)}: {error}.",
+            "It needs table_z_mm, and object with shape, scale, x_mm, y_mm, yaw_deg.",
+        ) from None
+
+
+class UnknownScene:
+    """What is in front of a real robot."""
+
+    solids: tuple[Solid, ...] = ()
+
+    def describe(self) -> dict[str, Any]:
+        """For a log's metadata: nothing is known."""
+        return {"scene": {}}

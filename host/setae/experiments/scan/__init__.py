@@ -18,8 +18,9 @@ z up. Robot and arm may be real or simulated; nothing here can tell.
 
 from __future__ import annotations
 
-from setae.experiments.scan.reading import read, read_logs, settings_of
+from setae.experiments.scan.reading import part_of, read, read_parts, scans_of, settings_of
 from setae.experiments.scan.run import (
+    EXPERIMENT,
     MODES,
     Mode,
     ScanResult,
@@ -35,6 +36,7 @@ from setae.experiments.scan.steps import require_window, window_mm
 from setae.experiments.scan.survey import Place, Survey
 
 __all__ = [
+    "EXPERIMENT",
     "MODES",
     "Mode",
     "Place",
@@ -42,12 +44,14 @@ __all__ = [
     "Survey",
     "arm_targets_mm",
     "in_scene",
+    "part_of",
     "read",
-    "read_logs",
+    "read_parts",
     "record_true_surface",
     "recorded",
     "require_window",
     "scan",
+    "scans_of",
     "settings_of",
     "simulate",
     "true_surface",

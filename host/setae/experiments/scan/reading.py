@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,7 +13,7 @@ from setae.experiments.scan.run import MODES, Mode, ScanResult
 from setae.experiments.scan.survey import Place, Survey
 from setae.record import Log
 
-__all__ = ["read", "read_logs", "settings_of"]
+__all__ = ["part_of", "read", "read_parts", "scans_of", "settings_of"]
 
 
 def read(path: str | Path) -> ScanResult:
@@ -30,50 +30,75 @@ def read(path: str | Path) -> ScanResult:
         There is no log, or it holds no scan, or more than one.
     """
     path = Path(path)
-    paths = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    if not path.is_dir():
+        return read_parts([record.read(path)])
+    paths = sorted(path.glob("*.mcap"))
     if not paths:
         raise LogError(f"{path} holds no log.", "Give the folder that `setae scan` wrote.")
-    return read_logs([record.read(each) for each in paths])
+    scans = scans_of([record.read(each) for each in paths])
+    if len(scans) > 1:
+        raise LogError(f"{path} holds {len(scans)} scans.", "Give one of its logs.")
+    return read_parts(scans[0])
 
 
-def read_logs(logs: Sequence[Log]) -> ScanResult:
-    """Read a scan from its logs; one that resumes another counts after it.
+def scans_of(logs: Iterable[Log]) -> list[list[Log]]:
+    """Sort logs into scans, each a first part and those that resumed it, in their order.
 
     Raises
     ------
     LogError
-        They hold no scan, or more than one.
+        A log holds no scan, or a part of one is missing.
     """
-    logs = sorted(logs, key=lambda log: int(log.metadata.get("part") or 1))
+    scans: dict[str, list[Log]] = {}
     for log in logs:
         if not log.events("scan_start"):
             raise LogError(f"{log.path} holds no scan.", "Give the log of a run of `setae scan`.")
-    begun = [log.events("scan_start")[0].data for log in logs]
-    if any(log.metadata.get("mode") != logs[0].metadata.get("mode") for log in logs) or [
-        int(log.metadata.get("part") or 1) for log in logs
-    ] != list(range(1, len(logs) + 1)):
-        raise LogError(
-            f"{logs[0].path.parent} holds the logs of different scans.", "Give one of the logs."
-        )
-    survey = Survey(settings_of(logs[0]))
+        scans.setdefault(str(log.metadata.get("mode")), []).append(log)
+    for parts in scans.values():
+        parts.sort(key=part_of)
+        if [part_of(log) for log in parts] != list(range(1, len(parts) + 1)):
+            raise LogError(
+                f"A part of the scan with {parts[0].path} is missing, or there twice.",
+                "Give all logs of its folder.",
+            )
+    return list(scans.values())
+
+
+def part_of(log: Log) -> int:
+    """Which part of its scan a log is, from 1."""
+    return int(log.metadata.get("part") or 1)
+
+
+def read_parts(parts: Sequence[Log]) -> ScanResult:
+    """Read a scan from its logs, first part first.
+
+    Raises
+    ------
+    LogError
+        They hold no scan.
+    """
+    starts = [log.events("scan_start") for log in parts]
+    if not all(starts):
+        raise LogError(f"{parts[0].path} holds no scan.", "Give the log of a run of `setae scan`.")
+    mode: Any = starts[0][0].data["mode"]
+    if mode not in MODES:
+        raise LogError(f"{parts[0].path} holds a scan of unknown mode {mode!r}.")
+    survey = Survey(settings_of(parts[0]))
     places: list[Place] = []
-    duration_s = 0.0
-    for log in logs:
+    # Of a single later part: what the others took.
+    duration_s = float(starts[0][0].data.get("earlier_s") or 0.0)
+    for log, start in zip(parts, starts, strict=True):
         found = [Place.of(event.data, event.time_us) for event in log.events("place")]
         survey.resume(found)
         places += found
-        start_us = log.events("scan_start")[0].time_us
-        duration_s += (log.events()[-1].time_us - start_us) / 1e6
-    mode: Any = begun[0]["mode"]
-    if mode not in MODES:
-        raise LogError(f"{logs[0].path} holds a scan of unknown mode {mode!r}.")
+        duration_s += (log.events()[-1].time_us - start[0].time_us) / 1e6
     return ScanResult(
         height_map=survey.height_map(),
         places=tuple(places),
         mode=cast(Mode, mode),
         duration_s=duration_s,
         complete=survey.known == len(survey),
-        scene=logs[0].metadata.get("scene") or {},
+        scene=parts[0].metadata.get("scene") or {},
     )
 
 

@@ -1,0 +1,419 @@
+"""`setae scan`: the paper's scan of a surface."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tomllib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+from rich.table import Table
+
+from setae import record, rig
+from setae.cli.arm import show_arm_targets
+from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.live_map import LiveMap
+from setae.cli.runs import STOPPED, later, say, what_is_left, write_report
+from setae.config import Config, loads
+from setae.errors import InputError, LogError, SetaeError
+from setae.experiments import scan as scans
+from setae.experiments.scan import Mode, ScanResult
+from setae.heightmap import TOUCHED
+from setae.objects import TableScene, UnknownScene, of_description, random_object, table_scene
+from setae.robot import Robot
+from setae.stage import Enter, ManualStage
+from setae.ur import UrStage
+
+Flag = Annotated[bool, Parameter(negative="")]
+
+# A person moves the arm by hand between two places, or brings it to the first.
+_MANUAL_TIMEOUT_S = 3600.0
+# How far off its earlier start a UR arm may stand to resume a scan.
+_SAME_START_MM = 0.5
+
+
+@app.command
+def scan(
+    *,
+    mode: Annotated[list[Mode] | None, Parameter(negative="")] = None,
+    object: str | None = None,  # noqa: A002  # the option's name
+    scene: Path | None = None,
+    area: str | None = None,
+    step: float | None = None,
+    order: Literal["zigzag", "raster"] | None = None,
+    tallest: float | None = None,
+    out: Path | None = None,
+    force: Flag = False,
+    resume: Path | None = None,
+    report: bool = True,
+    accept_jump: Flag = False,
+    stage: str | None = None,
+    dry_run: Flag = False,
+    where: Where | None = None,
+) -> None:
+    """Scan a surface from above: from place to place, extend until the bristle touches it.
+
+    The arm starts above the first place; from there the square goes along +x and +y. Each scan
+    writes a log into the folder --out, and all of them one report.
+
+    Parameters
+    ----------
+    mode
+        paper: the paper's cycle, which is the default. safe: retracted in every step. adaptive:
+        the same map in less time. Several times: one scan each, side by side in the report.
+    object
+        What the simulated robot scans: lidded_container, open_container, eraser, coil, orange, or
+        none. SHAPE:SEED gives another size, place and turn; --seed has nothing to do with them.
+    scene
+        Instead: a TOML file that says what stands where.
+    area
+        Sides along x and y in mm: 200, or 120x80.
+    step
+        From place to place, in mm.
+    order
+        Rows to and fro, or all in the same direction.
+    tallest
+        How far anything rises above the extended bristle's tip, in mm. The simulator knows.
+    out
+        Folder for logs and report; the default is the next free runs/scan-N.
+    force
+        Use --out though it holds files; logs of the same names are replaced.
+    resume
+        Folder or log of a scan that ended early: what it lacks is scanned, with its settings.
+    report
+        Write the report.
+    accept_jump
+        Enable the servos though nobody knows where they are, or they were left where the
+        configuration doesn't allow them: the first pulse may move them at full speed.
+    stage
+        The arm that carries the robot: ur://ADDRESS. Without it a simulated robot has a
+        simulated arm, and a real one a person who moves it.
+    dry_run
+        Connect to the arm, show where it would go, and move nothing.
+    where
+        Which robot.
+    """
+    where = where or Where()
+    if resume is not None:
+        given = (mode, object, scene, area, step, order, tallest, out, where.config, where.plant)
+        if any(value is not None for value in given):
+            raise InputError(
+                "--resume goes on with the settings of the earlier run.",
+                "Give it alone, or with --port, --stage, --accept-jump, --no-report.",
+            )
+        jobs, folder = _resumed(resume, where)
+    else:
+        config = _settings(where, area, step, order, tallest)
+        jobs = _fresh(config, where, mode or ["paper"], object, scene)
+        folder = cache(lambda: new_folder("scan", out, force=force))
+    for job in jobs:
+        scans.require_window(job.config, job.config.scan.tallest_mm)
+        scans.Survey(job.config.scan)
+    if dry_run:
+        show_arm_targets(stage, jobs[0].config, scans.arm_targets_mm(jobs[0].config.scan))
+        return
+    run = _Run(folder, stage, force=force, accept_jump=accept_jump)
+    run.all(jobs)
+    if report:
+        run.report()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Job:
+    """A scan to do: how, what, and what is known of it already."""
+
+    url: str | None
+    config: Config
+    mode: Mode
+    seed: int
+    scene: TableScene | None
+    known: ScanResult | None = None
+    part: int = 1
+    arm_base_mm: tuple[float, ...] | None = None
+
+    @property
+    def known_places(self) -> int:
+        return len(self.known.places) if self.known else 0
+
+    @property
+    def name(self) -> str:
+        return f"{self.mode}.mcap" if self.part == 1 else f"{self.mode}-{self.part}.mcap"
+
+
+# ----------------------------------------------------------------------- what to scan
+
+
+def _settings(
+    where: Where, area: str | None, step: float | None, order: str | None, tallest: float | None
+) -> Config:
+    config = where.load()
+    changes: dict[str, object] = {}
+    if area is not None:
+        changes["area_mm"] = _area_mm(area)
+    if step is not None:
+        changes["step_mm"] = step
+    if order is not None:
+        changes["order"] = order
+    if tallest is not None:
+        if where.simulated:
+            raise InputError("--tallest tells of a real object.", "The simulator knows its own.")
+        changes["tallest_mm"] = tallest
+    return dataclasses.replace(config, scan=dataclasses.replace(config.scan, **changes))  # type: ignore[arg-type]  # each as its key has it
+
+
+def _area_mm(text: str) -> tuple[float, float]:
+    parts = re.split(r"[x×]", text)
+    try:
+        sides = [float(part) for part in parts]
+    except ValueError:
+        sides = []
+    if len(sides) not in (1, 2):
+        raise InputError(f"--area {text!r} is no area.", "Give mm: --area 200 or --area 120x80.")
+    return sides[0], sides[-1]
+
+
+def _fresh(
+    config: Config, where: Where, modes: Sequence[Mode], object_: str | None, scene: Path | None
+) -> list[_Job]:
+    if len(set(modes)) < len(modes):
+        raise InputError("A --mode is given twice.", "Give each once.")
+    url = where.url
+    place: TableScene | None = None
+    if where.simulated:
+        if object_ is not None and scene is not None:
+            raise InputError("--object and --scene exclude each other.", "Give one of them.")
+        place = _scene(config, scene) if scene else _object(config, object_ or "eraser")
+        config = scans.in_scene(config, place)
+    elif object_ is not None or scene is not None:
+        raise InputError("--object and --scene are for the simulator.", "Give --sim too.")
+    return [_Job(url=url, config=config, mode=mode, seed=where.seed, scene=place) for mode in modes]
+
+
+def _object(config: Config, text: str) -> TableScene:
+    shape, _, seed = text.partition(":")
+    if shape == "none":
+        return table_scene(config)
+    if seed and not seed.isdecimal():
+        raise InputError(
+            f"--object {text!r}: {seed!r} is no seed.", "Give a whole number, as in eraser:3."
+        )
+    return table_scene(config, random_object(shape, int(seed or 0)))
+
+
+def _scene(config: Config, path: Path) -> TableScene:
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"The scene {path} can't be read: {error.strerror}.") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"The scene {path} isn't valid TOML: {error}.") from None
+    if "table_z_mm" not in data:
+        data["table_z_mm"] = table_scene(config).table_z_mm
+    found = of_description(data)
+    if unknown := set(data) - {"table_z_mm", "object"}:
+        raise InputError(
+            f"The scene {path} has no {sorted(unknown)[0]!r}.", "It has table_z_mm and [object]."
+        )
+    return found
+
+
+def _resumed(path: Path, where: Where) -> tuple[list[_Job], Callable[[], Path]]:
+    """The scan that a run left undone."""
+    logs = [path] if path.is_file() else sorted(path.glob("*.mcap"))
+    if not logs:
+        raise LogError(f"{path} holds no log.", "Give the folder that `setae scan` wrote.")
+    for parts in scans.scans_of(record.read(log) for log in _all_parts(logs)):
+        known = scans.read_parts(parts)
+        if not known.complete:
+            break
+    else:
+        raise InputError(f"The scan in {path} is complete.", "`setae report` makes its report.")
+    about = parts[0].metadata
+    config = loads(str(about.get("config", "")), source=str(parts[0].path))
+    simulated = bool(about.get("simulated"))
+    if simulated and where.port is not None:
+        raise InputError("That scan was simulated, so --port has no part in it.", "Leave it out.")
+    plant = str(about.get("plant") or "")
+    base_mm = about.get("arm_base_mm")
+    job = _Job(
+        url=(plant if plant.startswith("python:") else "sim://") if simulated else where.url,
+        config=config,
+        mode=known.mode,
+        seed=int(about.get("seed") or 0),
+        scene=of_description(known.scene) if simulated else None,
+        known=known,
+        part=len(parts) + 1,
+        arm_base_mm=None if base_mm is None else tuple(base_mm),
+    )
+    return [job], lambda: parts[0].path.parent
+
+
+def _all_parts(logs: Sequence[Path]) -> list[Path]:
+    """Of one log: the others of its scan, which lie beside it."""
+    if len(logs) > 1:
+        return list(logs)
+    stem = re.sub(r"-\d+$", "", logs[0].stem)
+    return sorted(logs[0].parent.glob(f"{stem}*.mcap"))
+
+
+# -------------------------------------------------------------------------- scanning
+
+
+class _Run:
+    """Scans one after the other, each with a log of its own in one folder."""
+
+    def __init__(
+        self, folder: Callable[[], Path], stage: str | None, *, force: bool, accept_jump: bool
+    ) -> None:
+        self._folder = folder
+        self._stage = stage
+        self._force = force
+        self._accept_jump = accept_jump
+        self._logs: list[Path] = []
+
+    def all(self, jobs: Sequence[_Job]) -> None:
+        """Do them all."""
+        results = []
+        try:
+            for job in jobs:
+                results.append(self._one(job))
+        except KeyboardInterrupt as interrupt:
+            failures = getattr(interrupt, "__notes__", [])
+            interrupt.__notes__ = [
+                *(["interrupted, but:", *failures] if failures else STOPPED),
+                *self._what_is_left(),
+            ]
+            raise
+        except SetaeError as error:
+            for line in self._what_is_left():
+                error.add_note(line)
+            raise
+        _print_table(results)
+        say(f"Logs: {self._folder()}")
+
+    def report(self) -> None:
+        """Write the report of all logs in the folder, earlier parts included."""
+        folder = self._folder()
+        try:
+            write_report(sorted(folder.glob("*.mcap")), folder)
+        except KeyboardInterrupt as interrupt:
+            interrupt.add_note(f"interrupted: the scan is done. {later(folder)}")
+            raise
+
+    def _what_is_left(self) -> list[str]:
+        if not self._logs:
+            return []
+        return [
+            *what_is_left(self._logs),
+            f"`setae scan --resume {self._logs[-1].parent}` goes on with the scan.",
+        ]
+
+    def _one(self, job: _Job) -> ScanResult:
+        what = "the surface" if job.scene is None else _name(job.scene)
+        begun = "" if job.known is None else f", from {job.known_places} known places on"
+        console.print(f"Scan of {what}, mode {job.mode}{begun}")
+        with LiveMap() as live, self._ready(job) as (opened, recorder):
+            if job.known is not None:
+                live.known(job.known.places)
+            return scans.scan(
+                opened.robot,
+                opened.stage,
+                mode=job.mode,
+                known=job.known.places if job.known else (),
+                earlier_s=job.known.duration_s if job.known else 0.0,
+                on_event=scans.recorded(recorder, live.event),
+                arm_timeout_s=_MANUAL_TIMEOUT_S if self._by_hand(job) else None,
+                scene=None if job.scene is None else job.scene.describe()["scene"],
+            )
+
+    @contextmanager
+    def _ready(self, job: _Job) -> Iterator[tuple[rig.Rig, record.Recorder]]:
+        """An enabled robot on its arm, and its log."""
+        with (
+            interrupts.caught(),
+            rig.open(
+                job.url,
+                config=job.config,
+                seed=job.seed,
+                scene=job.scene or UnknownScene(),
+                stage=ManualStage(ask=say) if self._by_hand(job) else self._stage,
+                pollables=[interrupts],
+            ) as opened,
+        ):
+            arm_base_mm = _arm_base_mm(opened, job)
+            # Only now, so that a board that isn't there costs neither work nor a folder.
+            log = self._folder() / job.name
+            if self._force:
+                log.unlink(missing_ok=True)
+            if self._by_hand(job):
+                _ask_for_start(opened.robot)
+            about = {
+                "experiment": scans.EXPERIMENT,
+                "mode": job.mode,
+                "part": job.part,
+                "arm_base_mm": arm_base_mm,
+            }
+            recorder = opened.record(log, metadata=about)
+            self._logs.append(log)
+            if opened.world is not None and job.scene is not None:
+                scans.record_true_surface(recorder, opened.world, job.scene, job.config.scan)
+            opened.robot.enable(accept_jump=self._accept_jump)
+            yield opened, recorder
+
+    def _by_hand(self, job: _Job) -> bool:
+        return self._stage is None and job.scene is None
+
+
+def _arm_base_mm(opened: rig.Rig, job: _Job) -> tuple[float, ...] | None:
+    """Where a UR arm's start is in its base frame; a resumed scan needs the same."""
+    stage = opened.stage
+    if not isinstance(stage, UrStage):
+        return None
+    now_mm, then_mm = stage.base_mm(stage.position_mm), job.arm_base_mm
+    if then_mm is not None and np.linalg.norm(np.subtract(now_mm, then_mm)) > _SAME_START_MM:
+        where = ", ".join(f"{value_mm:.1f}" for value_mm in then_mm)
+        raise InputError(
+            "The arm is not where the earlier run started.",
+            f"Bring frame D's origin to {where} mm in the arm's base frame, then resume.",
+        )
+    return now_mm
+
+
+def _ask_for_start(robot: Robot) -> None:
+    enter = Enter()
+    enter.forget()
+    say("Bring the arm to its start, above the first place of the scan, then press Enter.")
+    # In the robot's own loop: it is watched meanwhile, and Ctrl-C is heard.
+    robot.wait(enter.pressed, timeout_s=_MANUAL_TIMEOUT_S, what="the arm to be at its start")
+
+
+def _name(scene: TableScene) -> str:
+    what = scene.object
+    return "an empty table" if what is None else f"{what.shape}, size {what.scale:g}"
+
+
+def _print_table(results: Sequence[ScanResult]) -> None:
+    table = Table()
+    table.add_column("mode")
+    for name in ("robot time", "touched", "inferred", "empty", "flagged", "heights"):
+        table.add_column(name, justify="right")
+    for result in results:
+        mark = result.height_map.mark
+        heights_mm = result.height_map.points_mm()[:, 2]
+        table.add_row(
+            result.mode,
+            f"{result.duration_s:.0f} s",
+            str(int(np.isin(mark, TOUCHED).sum())),
+            str(int((mark == "inferred").sum())),
+            str(int((mark == "empty").sum())),
+            str(int(np.isin(mark, ("slipped", "double", "lost")).sum())),
+            f"{heights_mm.min():.1f} to {heights_mm.max():.1f} mm" if len(heights_mm) else "–",
+        )
+    console.print(table)
