@@ -12,7 +12,7 @@ from rich.live import Live
 from rich.text import Text
 
 from setae.cli.common import console
-from setae.experiments.explore import Event
+from setae.experiments.events import Event
 from setae.experiments.scan import Place
 from setae.heightmap import TOUCHED
 from setae.report import palette

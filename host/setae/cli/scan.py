@@ -20,9 +20,9 @@ from setae import record, rig
 from setae.cli.arm import show_arm_targets
 from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.cli.live_map import LiveMap
-from setae.cli.runs import STOPPED, later, say, what_is_left, write_report
+from setae.cli.runs import ended_early, make_way, say, what_is_left, write_report
 from setae.config import Config, loads
-from setae.errors import InputError, LogError, SetaeError
+from setae.errors import InputError, LogError
 from setae.experiments import scan as scans
 from setae.experiments.scan import Mode, ScanResult
 from setae.heightmap import TOUCHED
@@ -280,32 +280,15 @@ class _Run:
 
     def all(self, jobs: Sequence[_Job]) -> None:
         """Do them all."""
-        results = []
-        try:
-            for job in jobs:
-                results.append(self._one(job))
-        except KeyboardInterrupt as interrupt:
-            failures = getattr(interrupt, "__notes__", [])
-            interrupt.__notes__ = [
-                *(["interrupted, but:", *failures] if failures else STOPPED),
-                *self._what_is_left(),
-            ]
-            raise
-        except SetaeError as error:
-            for line in self._what_is_left():
-                error.add_note(line)
-            raise
+        with ended_early(self._what_is_left, what="robot and arm are stopped"):
+            results = [self._one(job) for job in jobs]
         _print_table(results)
         say(f"Logs: {self._folder()}")
 
     def report(self) -> None:
         """Write the report of all logs in the folder, earlier parts included."""
         folder = self._folder()
-        try:
-            write_report(sorted(folder.glob("*.mcap")), folder)
-        except KeyboardInterrupt as interrupt:
-            interrupt.add_note(f"interrupted: the scan is done. {later(folder)}")
-            raise
+        write_report(sorted(folder.glob("*.mcap")), folder)
 
     def _what_is_left(self) -> list[str]:
         if not self._logs:
@@ -351,7 +334,7 @@ class _Run:
             # Only now, so that a board that isn't there costs neither work nor a folder.
             log = self._folder() / job.name
             if self._force:
-                log.unlink(missing_ok=True)
+                make_way(log)
             if self._by_hand(job):
                 _ask_for_start(opened.robot)
             about = {

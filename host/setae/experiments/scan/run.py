@@ -110,7 +110,7 @@ def scan(
     earlier_s
         How long that took.
     on_event
-        Called with each `setae.experiments.explore.Event` as it happens: scan_start, step,
+        Called with each `setae.experiments.events.Event` as it happens: scan_start, step,
         step_contact, place, arm_return, scan_end, scan_aborted.
     arm_timeout_s
         Longest time for a move of the arm; None: what its configured speed asks for, and some
