@@ -87,6 +87,20 @@ def real_array(
     return raw
 
 
+def positive(name: str, value: npt.ArrayLike) -> float:
+    """Turn an argument into one number above 0, or raise InputError.
+
+    Examples
+    --------
+    >>> positive("speed_mm_s", 20)
+    20.0
+    """
+    array = finite_array(name, value)
+    if array.ndim or not array > 0:
+        raise InputError(f"{name} is {value!r}.", "It must be a number above 0.")
+    return float(array)
+
+
 def first_place(bad: npt.NDArray[np.bool_]) -> str:
     """Where the first bad entry is, as an index to put behind a name; empty for a scalar."""
     if bad.ndim == 0:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from setae import kinematics, servo, trajectory, workspace
-from setae.arc import Arc, FloatArray, finite_array
+from setae.arc import Arc, FloatArray, finite_array, positive
 from setae.config import Config
 from setae.errors import InputError, TrajectoryError, UnreachableError
 from setae.servo import Ticks
@@ -114,7 +114,7 @@ class Planner:
         require_one(duration_s, speed_mm_s)
         if duration_s is None:
             speed = self._config.motion.move_speed_mm_s if speed_mm_s is None else speed_mm_s
-            speed = _positive("speed_mm_s", speed)
+            speed = positive("speed_mm_s", speed)
             if speed > limit.min():
                 raise TrajectoryError(
                     f"{speed:g} mm/s is faster than the servos' {limit.min():.0f} mm/s.",
@@ -174,7 +174,7 @@ class Planner:
     ) -> Begun:
         """Tendon lengths where a circle begins, and the motion round it."""
         start_rad = math.radians(float(finite_array("start_deg", start_deg)))
-        radius = _positive("radius_mm", radius_mm)
+        radius = positive("radius_mm", radius_mm)
         arc = kinematics.inverse(
             (radius * math.cos(start_rad), radius * math.sin(start_rad), height_mm)
         )
@@ -242,9 +242,3 @@ def require_one(duration_s: float | None, speed_mm_s: float | None) -> None:
 def _four(ticks: npt.NDArray[np.int64]) -> Ticks:
     a, b, c, d = (int(tick) for tick in ticks)
     return a, b, c, d
-
-
-def _positive(name: str, value: float) -> float:
-    if not (math.isfinite(value) and value > 0):
-        raise InputError(f"{name} is {value}.", "Give a number above 0.")
-    return value

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from setae.arc import finite_array
+from setae.arc import finite_array, positive
 from setae.config import Config
 from setae.contact import Contact
 from setae.controls import Controls
@@ -296,6 +296,7 @@ class Robot(Controls):
             After a contact the robot holds, where it retracted to; the other motion was
             aborted, and may still be braking.
         """
+        positive("timeout_s", timeout_s)
         self._board.require_holding()
         retract = None
         if retract_mm is not None:

@@ -183,6 +183,11 @@ def test_bad_lengths_durations_and_speeds_are_refused(holding: Bench) -> None:
         robot.move_to(TARGET_MM, duration_s=0.05)
     with pytest.raises(TrajectoryError):
         robot.move_to(TARGET_MM, speed_mm_s=1000)
+    # These two came as errors of Python's own.
+    with pytest.raises(InputError, match="radius_mm"):
+        robot.circle("15", 60)  # type: ignore[arg-type]  # that is the mistake
+    with pytest.raises(InputError, match="timeout_s is nan"):
+        robot.hold_guarded(int, bool, int, timeout_s=math.nan)
     assert robot.state is State.HOLDING
 
 

@@ -8,9 +8,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self, TypeAlias
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qsl, urlsplit
 
 import setae
+from setae.arc import positive
 from setae.config import Config, load
 from setae.errors import InputError, LogError, StageError
 from setae.link.serial_transport import SerialTransport
@@ -55,7 +56,8 @@ def connect(
     Parameters
     ----------
     url
-        ``sim://`` for the simulator, ``python:module:factory`` for the simulator with
+        ``sim://`` for the simulator, ``sim://?seed=3&speed=1`` for one of that seed in
+        real time, ``python:module:factory`` for the simulator with
         another plant (`setae.sim.plugin`), a serial port such as ``/dev/ttyACM0``,
         or None to find the board by its USB ids.
     config
@@ -118,6 +120,8 @@ def open(  # noqa: A001  # rig.open() is what it does
     Rig
         Use it as a context manager.
     """
+    if leave not in ("relax", "hold"):
+        raise InputError(f"leave is {leave!r}.", "It must be 'relax' or 'hold'.")
     config = config or load()
     scene = scene or tube_scene(config)
     if isinstance(stage, str):
@@ -143,9 +147,11 @@ def _open(
     followers: list[Pollable] = []
     if url is not None and url.startswith(("sim://", plugin.PREFIX)):
         foreign = url if url.startswith(plugin.PREFIX) else None
-        seed = seed if foreign else _seed(url, seed)
+        asked = {} if foreign else _asked(url)
+        seed = _seed(asked.get("seed", str(seed)))
+        speed = _speed(asked["speed"]) if "speed" in asked else None
         world = _world(config, scene, seed, foreign)
-        transport: Transport = SimTransport(world, speed=1.0 if arm_is_real else None)
+        transport: Transport = SimTransport(world, speed=1.0 if arm_is_real else speed)
         if stage is not None and arm_is_real:
             followers.append(Follower(world, stage))
         stage = stage or SimulatedStage(world, config.stage)
@@ -179,9 +185,29 @@ def simulator_parameters(config: Config, seed: int) -> dict[str, float]:
     return {**plants.parameters(config.plant, seed), **dict(config.simulator)}
 
 
-def _seed(url: str, seed: int) -> int:
-    """The seed: the URL's own, such as sim://?seed=3, or the given one."""
-    text = parse_qs(urlsplit(url).query).get("seed", [str(seed)])[-1]
+def _asked(url: str) -> dict[str, str]:
+    """What a simulator's URL asks for, such as sim://?seed=3&speed=1."""
+    parts = urlsplit(url)
+    asked = dict(parse_qsl(parts.query, keep_blank_values=True))
+    unknown = sorted(asked.keys() - {"seed", "speed"})
+    if unknown or parts.netloc or parts.path:
+        raise InputError(
+            f"The simulator's URL {url!r} asks for what there is not.",
+            "Give sim://, or sim://?seed=3&speed=1: speed 1 is real time.",
+        )
+    return asked
+
+
+def _speed(text: str) -> float:
+    try:
+        return positive("speed", float(text))
+    except ValueError:
+        raise InputError(
+            f"The simulator's speed is {text!r}.", "Give a number above 0; 1 is real time."
+        ) from None
+
+
+def _seed(text: str) -> int:
     try:
         number = int(text)
     except ValueError:

@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from setae import kinematics
-from setae.arc import Arc, finite_array
+from setae.arc import Arc, finite_array, positive
 from setae.config import Geometry
 from setae.errors import InputError
 from setae.trajectory.laws import quintic, quintic_rate
 from setae.trajectory.parts import AtJump, at_speed, cut, leg, line_part, planned
 from setae.trajectory.paths import between, blended, circular
-from setae.trajectory.plan import FRAME_S, FrameTrajectory, Limits, TooFast, positive
+from setae.trajectory.plan import FRAME_S, FrameTrajectory, Limits, TooFast
 
 __all__ = ["along", "bend", "circle", "duration_for_speed", "hold", "line"]
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from setae import tendons
-from setae.arc import Arc, FloatArray, finite_array
+from setae.arc import Arc, FloatArray, finite_array, positive
 from setae.config import Geometry
 from setae.errors import InputError, TrajectoryError
 from setae.trajectory.laws import QUINTIC, Law, cruise_law
@@ -27,7 +27,6 @@ from setae.trajectory.plan import (
     check_too_fast,
     frames_of,
     joined,
-    positive,
     sampled,
     shortest,
     too_fast_error,

@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from setae.arc import FloatArray, finite_array, first_place
+from setae.arc import FloatArray, first_place
 from setae.errors import InputError, TrajectoryError
 from setae.trajectory.laws import Law
 from setae.trajectory.paths import Jump
@@ -24,7 +24,6 @@ __all__ = [
     "check_too_fast",
     "frames_of",
     "joined",
-    "positive",
     "sampled",
     "shortest",
     "too_fast_error",
@@ -223,14 +222,6 @@ def check_too_fast(too_fast: TooFast) -> None:
     """Raise InputError for anything but the two answers."""
     if too_fast not in ("raise", "stretch"):
         raise InputError(f"too_fast is {too_fast!r}.", "It must be 'raise' or 'stretch'.")
-
-
-def positive(name: str, value: npt.ArrayLike) -> float:
-    """Check one number above 0."""
-    array = finite_array(name, value)
-    if array.ndim or not array > 0:
-        raise InputError(f"{name} is {value!r}.", "It must be a number above 0.")
-    return float(array)
 
 
 def _least(path: Path, law: Law, ends: FloatArray) -> FloatArray:
