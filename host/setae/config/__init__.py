@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from setae.config.experiments import Explore, Scan, Tube
 from setae.config.geometry import Geometry
-from setae.config.reading import load, loads
+from setae.config.reading import load, loads, replaced
 from setae.config.sections import (
     SERVOS,
     TENDON_MODELS,
@@ -37,4 +37,5 @@ __all__ = [
     "Ur",
     "load",
     "loads",
+    "replaced",
 ]

@@ -76,7 +76,13 @@ def loads(text: str, *, source: str = "configuration") -> Config:
         resources.files("setae").joinpath("robots", "paper.toml").read_text(encoding="utf-8"),
         "robots/paper.toml",
     )
-    theirs = _parse(text, source)
+    return _config(_parse(text, source), paper, source)
+
+
+def _config(
+    theirs: Mapping[str, dict[str, Any]], paper: Mapping[str, dict[str, Any]], source: str
+) -> Config:
+    """Make the configuration of checked values, theirs before the paper's."""
     sections: dict[str, Any] = {}
     for name, section in SECTIONS.items():
         values = {**paper.get(name, {}), **theirs.get(name, {})}
@@ -92,12 +98,45 @@ def loads(text: str, *, source: str = "configuration") -> Config:
         raise ConfigError(f"{source}: {error.problem}", error.remedy) from None
 
 
+def replaced(config: Config, changes: Mapping[str, Any]) -> Config:
+    """Return a configuration in which some keys have other values.
+
+    Parameters
+    ----------
+    config
+        The robot.
+    changes
+        Values by section and key, as a file has them: ``{"scan.step_mm": 20}``.
+
+    Raises
+    ------
+    ConfigError
+        There is no such key, or it can't have that value.
+
+    Examples
+    --------
+    >>> replaced(loads(""), {"bristle.threshold_hpa": 20}).bristle.threshold_hpa
+    20.0
+    """
+    document = tomllib.loads(config.to_toml())
+    for name, value in changes.items():
+        section, _, key = name.partition(".")
+        if not key:
+            raise ConfigError(f"{name!r} is no key.", "Give section and key: scan.step_mm.")
+        document.setdefault(section, {})[key] = value
+    return _config(_parse_document(document, "change"), {}, "change")
+
+
 def _parse(text: str, source: str) -> dict[str, dict[str, Any]]:
     """Checked values by section and field."""
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{source} isn't valid TOML: {error}.") from None
+    return _parse_document(document, source)
+
+
+def _parse_document(document: Mapping[str, Any], source: str) -> dict[str, dict[str, Any]]:
     result: dict[str, dict[str, Any]] = {}
     for name, table in document.items():
         known = [*SECTIONS, "simulator"]

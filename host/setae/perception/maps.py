@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from setae.arc import FloatArray
 from setae.errors import InputError
 from setae.heightmap import HeightMap
 
-__all__ = ["known", "read", "resampled", "write"]
+__all__ = ["as_bytes", "known", "read", "resampled", "write"]
 
 _FIELDS = ("x_mm", "y_mm", "height_mm", "mark")
 
@@ -28,10 +29,17 @@ def write(path: str | Path, heights: HeightMap) -> Path:
         raise InputError(f"{path}: a height map is written as .npz.", "Give such a name.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(path, **{name: getattr(heights, name) for name in _FIELDS})
+        path.write_bytes(as_bytes(heights))
     except OSError as error:
         raise InputError(f"{path} can't be written: {error.strerror or error}.") from error
     return path
+
+
+def as_bytes(heights: HeightMap) -> bytes:
+    """Return the content of such a file."""
+    file = io.BytesIO()
+    np.savez_compressed(file, **{name: getattr(heights, name) for name in _FIELDS})
+    return file.getvalue()
 
 
 def read(path: str | Path) -> HeightMap:

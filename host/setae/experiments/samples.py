@@ -1,0 +1,214 @@
+"""Scans to compare: from logs, from a study's folder, or from height maps in files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from setae import record
+from setae.config import Config, load, loads
+from setae.errors import ConfigError, InputError, LogError, SetaeError
+from setae.experiments import scan
+from setae.experiments.study.conduct import RUNS
+from setae.experiments.study.one import MAP
+from setae.heightmap import HeightMap
+from setae.objects import ScanObject, TableScene
+from setae.perception import maps
+from setae.solids import Solid
+
+__all__ = ["Sample", "read", "read_all"]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Sample:
+    """One scan.
+
+    Attributes
+    ----------
+    name
+        Of its file or folder.
+    label
+        What was scanned, where it is known.
+    heights
+        What was felt.
+    reach_mm
+        z of the world that the extended tip reached.
+    scene
+        The true scene, where the scan was simulated.
+    origin
+        Where it comes from, in words.
+    """
+
+    name: str
+    label: str | None
+    heights: HeightMap
+    reach_mm: float
+    scene: TableScene | None
+    origin: str
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """The true scene's, or none."""
+        return self.scene.solids if self.scene else ()
+
+
+def read_all(given: Iterable[str | Path]) -> list[Sample]:
+    """Read all scans of some paths, each as in `read`.
+
+    Raises
+    ------
+    InputError, LogError
+        A path holds no scan.
+    """
+    return [sample for one in given for sample in read(one)]
+
+
+def read(given: str | Path) -> list[Sample]:
+    """Read the scans of a path.
+
+    Parameters
+    ----------
+    given
+        A log; a folder with the logs of one scan; a study's folder, with many; a height map
+        (``.npz``). ``NAME=PATH`` says what was scanned: a real scan doesn't know.
+
+    Returns
+    -------
+    list of Sample
+        Failed runs of a study are left out.
+
+    Raises
+    ------
+    InputError, LogError
+        There is no such path, or it holds no scan.
+    """
+    label, path = _named(given)
+    if not path.exists():
+        raise InputError(f"There is no {path}.", "Give logs or folders of `setae scan`.")
+    if path.suffix.lower() == ".npz":
+        found = [_of_map(path)]
+    elif (path / RUNS).is_dir():
+        found = [_of_run(folder) for folder in sorted((path / RUNS).iterdir()) if _done(folder)]
+    elif (path / MAP).is_file():
+        found = [_of_run(path)]
+    else:
+        found = [_of_logs(path)]
+    if not found:
+        raise InputError(f"{path} holds no finished run.", "Let the study go on.")
+    if label is None:
+        return found
+    return [
+        Sample(
+            name=sample.name,
+            label=label,
+            heights=sample.heights,
+            reach_mm=sample.reach_mm,
+            scene=sample.scene,
+            origin=sample.origin,
+        )
+        for sample in found
+    ]
+
+
+def _named(given: str | Path) -> tuple[str | None, Path]:
+    text = str(given)
+    name, sign, path = text.partition("=")
+    # A path may hold the sign too.
+    if sign and name and "/" not in name and not Path(text).exists():
+        return name, Path(path)
+    return None, Path(text)
+
+
+def _of_map(path: Path) -> Sample:
+    return Sample(
+        name=path.stem,
+        label=None,
+        heights=maps.read(path),
+        reach_mm=_reach_mm(load()),
+        scene=None,
+        origin=f"from {path.name}",
+    )
+
+
+def _of_logs(path: Path) -> Sample:
+    paths = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    if not paths:
+        raise LogError(f"{path} holds no log.", "Give the folder that `setae scan` wrote.")
+    logs = [record.read(one) for one in paths]
+    result = scan.read_logs(logs)
+    scene = _scene(result.scene) if logs[0].simulated else None
+    try:
+        config = loads(str(logs[0].metadata.get("config", "")), source=str(paths[0]))
+    except ConfigError as error:
+        raise LogError(f"The configuration in {paths[0]} can't be used.", str(error)) from error
+    origin = "measured on the robot"
+    if logs[0].simulated:
+        origin = f"simulated, plant {config.plant}, mode {result.mode}"
+    return Sample(
+        name=path.stem if path.is_file() else path.name,
+        label=scene.object.shape if scene and scene.object else None,
+        heights=result.height_map,
+        reach_mm=_reach_mm(config),
+        scene=scene,
+        origin=origin,
+    )
+
+
+def _scene(data: Mapping[str, Any]) -> TableScene | None:
+    """The scene that a log tells of; None: nothing is known of it."""
+    if "table_z_mm" not in data:
+        return None
+    try:
+        what = data.get("object")
+        return TableScene(
+            table_z_mm=float(data["table_z_mm"]),
+            object=None if what is None else ScanObject(**what),
+        )
+    except (TypeError, ValueError, SetaeError):
+        return None
+
+
+def _done(folder: Path) -> bool:
+    return _row(folder).get("status") == "done"
+
+
+def _row(folder: Path) -> dict[str, Any]:
+    try:
+        row = json.loads((folder / "row.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return row if isinstance(row, dict) else {}
+
+
+def _of_run(folder: Path) -> Sample:
+    row = _row(folder)
+    scene = None
+    try:
+        if row["object_scale"] is not None:
+            what = ScanObject(
+                shape=row["object"],
+                scale=row["object_scale"],
+                x_mm=row["object_x_mm"],
+                y_mm=row["object_y_mm"],
+                yaw_deg=row["object_yaw_deg"],
+            )
+            scene = TableScene(table_z_mm=row["table_z_mm"], object=what)
+        reach_mm = float(row["reach_mm"])
+    except (KeyError, TypeError, ValueError, SetaeError) as error:
+        raise InputError(f"{folder} holds no run of this version: {error}.") from error
+    plant = row.get("simulator.plant_name") or "ideal"
+    return Sample(
+        name=folder.name,
+        label=scene.object.shape if scene and scene.object else None,
+        heights=maps.read(folder / MAP),
+        reach_mm=reach_mm,
+        scene=scene,
+        origin=f"simulated, plant {plant}, mode {row.get('mode')}",
+    )
+
+
+def _reach_mm(config: Config) -> float:
+    return -(config.scan_lengths_mm[1] + config.geometry.tip_offset_mm)

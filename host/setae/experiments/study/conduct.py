@@ -1,0 +1,177 @@
+"""All runs of a study: in this process, in some on this machine, or on a cluster.
+
+What a run gives is kept at once, in a folder of its own, its line of the table last: a line that
+is there belongs to a run that is whole. So an interrupted study goes on where it was.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+from setae import extras
+from setae.errors import InputError, SetaeError
+from setae.experiments.study.one import Outcome, perform
+from setae.experiments.study.plan import Run
+
+__all__ = ["RUNS", "Row", "conduct", "finished"]
+
+Row: TypeAlias = Mapping[str, Any]
+"""A run's line of the table."""
+
+RUNS: Final = "runs"
+_ROW: Final = "row.json"
+_CONNECT_S: Final = 10
+
+
+def conduct(
+    runs: Sequence[Run],
+    folder: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    on_row: Callable[[Row], None] | None = None,
+    task: Callable[[Run], Outcome] = perform,
+) -> list[Row]:
+    """Do those runs that aren't done yet.
+
+    Parameters
+    ----------
+    runs
+        All runs of the study.
+    folder
+        Where they are kept; runs that are done there are left out, failed ones are tried again.
+    workers
+        Processes on this machine; 1: this one. None: one for each core that it may use.
+    scheduler
+        Address of a dask scheduler, such as ``tcp://10.0.0.1:8786``; its workers do the runs.
+    on_row
+        Called with each run's line when it has ended, also with those of earlier runs.
+    task
+        What does one run.
+
+    Returns
+    -------
+    list
+        Lines of all runs, in their order. Those of runs that failed say why.
+
+    Raises
+    ------
+    InputError
+        Workers and a scheduler are both given, or the number of workers is no good.
+    SetaeError
+        There is no such scheduler, or the folder can't be written to.
+    ExtraMissingError
+        dask.distributed isn't installed.
+    """
+    if scheduler is not None and workers is not None:
+        raise InputError("A scheduler has workers of its own.", "Give it, or --workers.")
+    workers = workers if workers is not None else len(os.sched_getaffinity(0))
+    if workers < 1:
+        raise InputError(f"{workers} workers do nothing.", "Give 1 or more.")
+    rows = {run.name: row for run in runs if (row := finished(folder, run)) is not None}
+    told = on_row or _ignore
+    for row in rows.values():
+        told(row)
+    left = [run for run in runs if run.name not in rows]
+    if scheduler is None:
+        workers = min(workers, len(left))
+    for run, outcome in _outcomes(left, workers, scheduler, task):
+        _keep(folder / RUNS / run.name, outcome)
+        rows[run.name] = outcome.row
+        told(outcome.row)
+    return [rows[run.name] for run in runs]
+
+
+def _ignore(row: Row) -> None:
+    del row
+
+
+def finished(folder: Path, run: Run) -> Row | None:
+    """Line of a run that is done; None where it isn't, or has failed."""
+    try:
+        row = json.loads((folder / RUNS / run.name / _ROW).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return row if isinstance(row, dict) and row.get("status") == "done" else None
+
+
+def _keep(folder: Path, outcome: Outcome) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in outcome.files.items():
+            (folder / name).write_bytes(content)
+        unfinished = folder / f"{_ROW}.part"
+        unfinished.write_text(json.dumps(outcome.row, indent=1) + "\n", encoding="utf-8")
+        unfinished.replace(folder / _ROW)
+    except OSError as error:
+        raise SetaeError(
+            f"{folder} can't be written to: {error.strerror or error}.",
+            "Make room, or give another --out; the same call then goes on.",
+        ) from error
+
+
+def _outcomes(
+    runs: Sequence[Run], workers: int, scheduler: str | None, task: Callable[[Run], Outcome]
+) -> Iterable[tuple[Run, Outcome]]:
+    if not runs:
+        return ()
+    if scheduler is None and workers == 1:
+        return ((run, task(run)) for run in runs)
+    return _distributed(runs, workers, scheduler, task)
+
+
+def _distributed(
+    runs: Sequence[Run], workers: int, scheduler: str | None, task: Callable[[Run], Outcome]
+) -> Iterator[tuple[Run, Outcome]]:
+    distributed = extras.load("distributed", "study", "More than one worker")
+    with ExitStack() as stack:
+        if scheduler is None:
+            # Nobody else can reach it, and it has no pages.
+            cluster = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    host="127.0.0.1",
+                    dashboard_address=None,
+                    silence_logs=50,
+                )
+            )
+            client = stack.enter_context(distributed.Client(cluster))
+        else:
+            try:
+                client = stack.enter_context(distributed.Client(scheduler, timeout=_CONNECT_S))
+            except (OSError, ValueError, TypeError) as error:
+                raise SetaeError(
+                    f"There is no scheduler at {scheduler}.",
+                    "Start one with `dask scheduler`, and give its address: tcp://HOST:8786.",
+                ) from error
+        # Not pure: a run that failed is tried again by the next call, not remembered.
+        futures = client.map(task, runs, pure=False, retries=0)
+        of = {future.key: run for future, run in zip(futures, runs, strict=True)}
+        ended = distributed.as_completed(futures, raise_errors=False)
+        del futures  # so that what has been read leaves the workers' memory
+        for future in ended:
+            run = of[future.key]
+            lost = future.exception()
+            yield run, future.result() if lost is None else _lost(run, lost)
+
+
+def _lost(run: Run, error: BaseException) -> Outcome:
+    """Outcome of a run whose worker died, or couldn't begin."""
+    return Outcome(
+        row={
+            "run": run.name,
+            "object": run.object,
+            "seed": run.seed,
+            "mode": run.mode,
+            **dict(run.changes),
+            "status": "failed",
+            "error": f"{type(error).__name__}: {error}",
+        }
+    )
