@@ -13,14 +13,36 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
-from setae.cli import calibrate, experiment, firmware, logs, robot, scan, validate, workspace
+from setae.cli import (
+    calibrate,
+    experiment,
+    firmware,
+    logs,
+    robot,
+    scan,
+    shapes,
+    study,
+    validate,
+    workspace,
+)
 from setae.cli.common import app, with_plugin
 from setae.errors import SetaeError
 
 __all__ = ["app", "main"]
 
 # Each adds its commands when it is imported.
-_COMMANDS = (robot, experiment, scan, validate, calibrate, logs, workspace, firmware)
+_COMMANDS = (
+    robot,
+    experiment,
+    scan,
+    shapes,
+    study,
+    validate,
+    calibrate,
+    logs,
+    workspace,
+    firmware,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

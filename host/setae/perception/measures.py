@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from setae import extras
 from setae.arc import FloatArray
-from setae.heightmap import TOUCHED, HeightMap
+from setae.heightmap import HeightMap
+from setae.perception import maps
 from setae.perception.surface import height_mm
 from setae.solids import Solid
 
@@ -32,8 +33,8 @@ class Nearness:
     Attributes
     ----------
     height_rms_mm
-        Root mean square of measured less true height, over touched places away from edges; NaN
-        where there is none.
+        Root mean square of the map's less the true height, over places away from edges that have
+        a height, touched or inferred; NaN where there is none.
     height_bias_mm
         Mean of the same differences.
     places
@@ -41,9 +42,9 @@ class Nearness:
     chamfer_mm
         Mean of the next two.
     to_surface_mm
-        Mean distance in space of the touched points from the true upper surface.
+        Mean distance in space of the map's points from the true upper surface.
     from_surface_mm
-        Mean distance of the true surface, at the places of the scan, from the touched points.
+        Mean distance of the true surface, at the places of the scan, from the map's points.
     """
 
     height_rms_mm: float
@@ -97,10 +98,9 @@ def nearness(heights: HeightMap, solids: Sequence[Solid], *, reach_mm: float) ->
     tree = extras.load("scipy.spatial", "perception", "Measuring distances").cKDTree
     x, y = np.meshgrid(heights.x_mm, heights.y_mm)
     true = height_mm(solids, x, y)
-    felt = np.isin(heights.mark, TOUCHED) & np.isfinite(heights.height_mm)
-    judged = felt & away_from_edges(solids, x, y) & (true >= reach_mm)
+    judged = np.isfinite(heights.height_mm) & away_from_edges(solids, x, y) & (true >= reach_mm)
     error = heights.height_mm[judged] - true[judged]
-    points = heights.points_mm()
+    points = maps.known(heights)
     there = true >= reach_mm
     at_places = np.stack([x[there], y[there], true[there]], axis=1)
     dense = _dense_mm(heights, solids, reach_mm)

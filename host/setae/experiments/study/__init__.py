@@ -6,12 +6,14 @@ what came out, and `table` is that as one table.
 
 from __future__ import annotations
 
-from setae.experiments.study.conduct import Row, conduct
-from setae.experiments.study.one import Outcome, perform
+from setae.experiments.study.conduct import RUNS, Row, conduct
+from setae.experiments.study.one import MAP, Outcome, perform
 from setae.experiments.study.plan import Plan, Run, load, of_options
 from setae.experiments.study.table import read_table, write_table
 
 __all__ = [
+    "MAP",
+    "RUNS",
     "Outcome",
     "Plan",
     "Row",

@@ -1,0 +1,106 @@
+"""Point clouds and height maps, drawn the same in every picture."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from setae.arc import FloatArray
+from setae.heightmap import HeightMap
+from setae.perception import maps
+from setae.report import extras, palette
+
+__all__ = ["SHAPE_COLOURS", "draw_cloud", "draw_map", "title_of"]
+
+SHAPE_COLOURS: Final = ("#2b5c8a", "#e07b1a", "#12888a", "#8a3fa0", "#d4213d", "#7a8b1f", "#41566b")
+"""One for each shape, in their order; more shapes begin anew."""
+
+_EYE_DEG = (28.0, -62.0)
+
+
+def title_of(name: str) -> str:
+    """Words instead of a name with underscores."""
+    return name.replace("_", " ")
+
+
+def draw_cloud(axes: Any, heights: HeightMap) -> None:
+    """Draw a map's points about their mean, coloured by distance to it as in the paper's figure 5.
+
+    Parameters
+    ----------
+    axes
+        Three-dimensional.
+    heights
+        The scan.
+    """
+    points = maps.known(heights)
+    if len(points):
+        points = points - points.mean(axis=0)
+        away = np.linalg.norm(points, axis=1)
+        axes.scatter(
+            *points.T, c=away, cmap=_map(), s=11, depthshade=False, linewidths=0,
+            vmin=0, vmax=max(float(away.max()), 1.0),
+        )  # fmt: skip
+    half = max(50.0, float(np.abs(points[:, :2]).max())) if len(points) else 50.0
+    rise = max(25.0, float(np.abs(points[:, 2]).max())) if len(points) else 25.0
+    axes.set(xlim=(-half, half), ylim=(-half, half), zlim=(-rise, rise))
+    axes.set_box_aspect((1, 1, rise / half), zoom=1.1)
+    axes.view_init(elev=_EYE_DEG[0], azim=_EYE_DEG[1])
+    axes.tick_params(labelsize=7, pad=-3)
+    axes.locator_params(nbins=4)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_pane_color((1, 1, 1, 1))
+        axis._axinfo["grid"].update(color=palette.GRID, linewidth=0.6)
+
+
+def draw_map(axes: Any, heights: HeightMap, *, low_mm: float, high_mm: float) -> Any:
+    """Draw a height map from above; places without a height stay pale, doubtful ones get a dot.
+
+    Parameters
+    ----------
+    axes
+        Where to.
+    heights
+        The scan.
+    low_mm, high_mm
+        Ends of the colours' scale, z of the world.
+
+    Returns
+    -------
+    object
+        What a colour bar needs.
+    """
+    axes.set_facecolor(palette.PANEL)
+    drawn = axes.imshow(
+        heights.height_mm,
+        origin="lower",
+        extent=_extent(heights),
+        cmap=_map(),
+        vmin=low_mm,
+        vmax=high_mm,
+        interpolation="nearest",
+    )
+    rows, columns = np.nonzero(np.isin(heights.mark, ("slipped", "double", "lost")))
+    axes.scatter(heights.x_mm[columns], heights.y_mm[rows], s=3, color=palette.INK, linewidths=0)
+    axes.set(xticks=[], yticks=[])
+    for side in axes.spines.values():
+        side.set(visible=True, color=palette.GRID)
+    return drawn
+
+
+def _extent(heights: HeightMap) -> tuple[float, float, float, float]:
+    ends = []
+    for places in (heights.x_mm, heights.y_mm):
+        half = _half(places)
+        ends += [float(places[0]) - half, float(places[-1]) + half]
+    return ends[0], ends[1], ends[2], ends[3]
+
+
+def _half(places_mm: FloatArray) -> float:
+    return float(np.median(np.diff(places_mm))) / 2 if len(places_mm) > 1 else 0.5
+
+
+def _map() -> Any:
+    colours = extras.load("matplotlib.colors")
+    return colours.LinearSegmentedColormap.from_list("heat", palette.HEAT)

@@ -1,0 +1,272 @@
+"""The report of scans side by side: clouds as in the paper's figure 5, t-SNE, who is told apart."""
+
+from __future__ import annotations
+
+import csv
+import html
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from setae.experiments.shapes import Comparison
+from setae.perception.features import FEATURES
+from setae.report import clouds, files, palette, style, template
+from setae.report.files import Report
+
+__all__ = ["clouds_picture", "finding", "trials_picture", "write"]
+
+_TRIALS_SHOWN = 8
+
+
+def write(found: Comparison, out: str | Path, *, page: str = "report.html") -> Report:
+    """Write the report of a comparison.
+
+    Parameters
+    ----------
+    found
+        What `setae.experiments.shapes.compare` found.
+    out
+        The folder to write to; made if it isn't there.
+    page
+        Name of the page in it.
+
+    Raises
+    ------
+    LogError
+        The folder can't be written to.
+    ExtraMissingError
+        Matplotlib isn't installed.
+    """
+    folder = Path(out)
+    with files.writing(folder):
+        (folder / "pictures").mkdir(exist_ok=True)
+        drawn = (
+            clouds_picture(folder / "pictures" / "clouds.png", found),
+            trials_picture(folder / "pictures" / "maps.png", found),
+        )
+        table = _csv(folder / "trials.csv", found)
+        (folder / page).write_text(_page(found, drawn), encoding="utf-8")
+    return Report(page=folder / page, pictures=drawn, tables=(table,))
+
+
+def finding(found: Comparison) -> str:
+    """Say in a few sentences what came out."""
+    right = round(found.accuracy * len(found.labels))
+    unknown = round(found.unknown * len(found.labels))
+    return (
+        f"{right} of {len(found.labels)} scans are named right by a model of all the others; "
+        f"{unknown} of {len(found.labels)} are unknown to a model that never met their shape."
+    )
+
+
+# ---------------------------------------------------------------------------- pictures
+
+
+def clouds_picture(path: Path, found: Comparison) -> Path:
+    """Draw one cloud of each shape, and all trials in the plane of t-SNE."""
+    shapes = found.shapes
+    columns = 3 if len(shapes) <= 5 else 4
+    rows = -(-(len(shapes) + 1) // columns)
+    with style.used():
+        figure = style.figure(4.1 * columns, 3.55 * rows + 0.75)
+        top = 1 - 0.75 / (3.55 * rows + 0.75)
+        figure.text(0.02, 1 - 0.28 * (1 - top), "What the bristle felt of each object",
+                    fontsize=16, weight="bold", va="top")  # fmt: skip
+        figure.text(0.02, 1 - 0.72 * (1 - top), _note(found), fontsize=10, color=palette.MUTED,
+                    va="top")  # fmt: skip
+        grid = figure.add_gridspec(rows, columns, left=0.02, right=0.97, bottom=0.04,
+                                   top=top - 0.05, wspace=0.12, hspace=0.2)  # fmt: skip
+        places = [grid[divmod(index, columns)] for index in range(rows * columns)]
+        for index, (shape, place) in enumerate(zip(shapes, places, strict=False)):
+            axes = figure.add_subplot(place, projection="3d")
+            sample = found.samples[found.labels.index(shape)]
+            clouds.draw_cloud(axes, sample.heights)
+            axes.set_title(f"({chr(97 + index)}) {clouds.title_of(shape)}", pad=2)
+        axes = figure.add_subplot(places[len(shapes)])
+        _draw_plane(axes, found)
+        axes.set_title(f"({chr(97 + len(shapes))}) t-SNE of the paper's data", pad=8)
+        style.save(figure, path)
+    return path
+
+
+def _draw_plane(axes: Any, found: Comparison) -> None:
+    labels = np.asarray(found.labels)
+    for index, shape in enumerate(found.shapes):
+        some = found.plane[labels == shape]
+        axes.scatter(
+            *some.T, s=42, linewidths=0.8, edgecolors="white", label=clouds.title_of(shape),
+            color=clouds.SHAPE_COLOURS[index % len(clouds.SHAPE_COLOURS)],
+        )  # fmt: skip
+    axes.set(xticks=[], yticks=[])
+    axes.margins(0.12)
+    for side in axes.spines.values():
+        side.set(visible=True, color=palette.GRID)
+    axes.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.01),
+                ncols=3, handletextpad=0.1, columnspacing=0.8)  # fmt: skip
+
+
+def trials_picture(path: Path, found: Comparison) -> Path:
+    """Draw every trial's height map, what a model of the others says of it below."""
+    shapes = found.shapes
+    by_shape = {s: [i for i, label in enumerate(found.labels) if label == s] for s in shapes}
+    columns = min(_TRIALS_SHOWN, max(len(some) for some in by_shape.values()))
+    heights = np.concatenate([sample.heights.height_mm.ravel() for sample in found.samples])
+    low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
+    with style.used():
+        width, height = 1.75 * columns + 1.9, 2.0 * len(shapes) + 1.15
+        figure = style.figure(width, height)
+        figure.text(0.25 / width, 1 - 0.2 / height, "Height maps from above", fontsize=15,
+                    weight="bold", va="top")  # fmt: skip
+        figure.text(0.25 / width, 1 - 0.55 / height, "Below each: what a model of all the others "
+                    "says, and how sure it is.", fontsize=9.5, color=palette.MUTED,
+                    va="top")  # fmt: skip
+        grid = figure.add_gridspec(len(shapes), columns, left=0.45 / width,
+                                   right=1 - 1.15 / width, bottom=0.3 / height,
+                                   top=1 - 0.95 / height, wspace=0.1, hspace=0.3)  # fmt: skip
+        for row, (shape, some) in enumerate(by_shape.items()):
+            for column, index in enumerate(some[:columns]):
+                axes = figure.add_subplot(grid[row, column])
+                drawn = clouds.draw_map(axes, found.samples[index].heights,
+                                        low_mm=low, high_mm=high)  # fmt: skip
+                answer = found.answers[index]
+                right = answer.shape == shape
+                said = clouds.title_of(answer.shape or "unknown")
+                axes.set_xlabel(f"{said}, {answer.confidence:.0%}", fontsize=8,
+                                color=palette.AGREES if right else palette.CONTACT)  # fmt: skip
+                if column == 0:
+                    axes.set_ylabel(clouds.title_of(shape), fontsize=10, weight="bold")
+        scale = figure.add_axes((1 - 0.85 / width, 0.3 / height, 0.16 / width, 1 - 1.25 / height))
+        figure.colorbar(drawn, cax=scale).set_label("height below the arm (mm)", fontsize=9)
+        scale.tick_params(labelsize=8)
+        style.save(figure, path)
+    return path
+
+
+def _note(found: Comparison) -> str:
+    origins = dict.fromkeys(sample.origin for sample in found.samples)
+    text = "; ".join(origins) if len(origins) <= 2 else f"{len(origins)} kinds of scans"
+    return (
+        f"First trial of each, about its middle, in mm; red is far from it. {len(found.samples)} "
+        f"scans, {text}."
+    )
+
+
+# -------------------------------------------------------------------------------- page
+
+
+def _page(found: Comparison, drawn: tuple[Path, ...]) -> str:
+    simulated = all(sample.scene is not None for sample in found.samples)
+    badge = (
+        '<span class="badge">Simulated: no hardware</span>'
+        if simulated
+        else '<span class="badge real">Scans from files and logs</span>'
+    )
+    meanings = "".join(
+        f"<li><b>{html.escape(feature.name)}</b>: {html.escape(feature.meaning)} "
+        f"(expected spread {feature.spread:g})</li>"
+        for feature in FEATURES
+    )
+    return template.fill(
+        "cluster.html",
+        {
+            "css": template.text("page.css"),
+            "badges": badge,
+            "finding": html.escape(finding(found)),
+            "clouds": template.image(drawn[0], "Point clouds and their t-SNE"),
+            "maps": template.image(drawn[1], "Height maps of all trials"),
+            "measures": _measures(found),
+            "shapes": _shapes(found),
+            "trials": _trials(found),
+            "features": meanings,
+        },
+    )
+
+
+def _measures(found: Comparison) -> str:
+    rows = [
+        ("named right, of all scans, each by a model of the others", f"{found.accuracy:.0%}"),
+        ("unknown to a model without their shape", f"{found.unknown:.0%}"),
+        ("silhouette of the descriptions, in units of expected spread", f"{found.silhouette:.2f}"),
+        ("silhouette of the paper’s 20 × 15 data", f"{found.silhouette_paper:.2f}"),
+        ("silhouette of these in the plane of t-SNE", f"{found.silhouette_plane:.2f}"),
+    ]
+    near = [one for one in found.nearness if one is not None]
+    if near:
+        rms = float(np.sqrt(np.nanmean([one.height_rms_mm**2 for one in near])))
+        chamfer = float(np.nanmean([one.chamfer_mm for one in near]))
+        rows.append(("height error away from edges, root mean square", f"{rms:.2f} mm"))
+        rows.append(("Chamfer distance to the true surface, mean", f"{chamfer:.2f} mm"))
+    body = "".join(f"<tr><td>{name}</td><td><b>{value}</b></td></tr>" for name, value in rows)
+    return f"<table><tbody>{body}</tbody></table>"
+
+
+def _shapes(found: Comparison) -> str:
+    lines = []
+    for shape in found.shapes:
+        some = [i for i, label in enumerate(found.labels) if label == shape]
+        right = sum(found.answers[i].shape == shape for i in some)
+        unknown = sum(not found.strangers[i].known for i in some)
+        near = [one for i in some if (one := found.nearness[i]) is not None]
+        cells = [
+            clouds.title_of(shape),
+            f"{right} of {len(some)}",
+            f"{unknown} of {len(some)}",
+            *_middle_of(near),
+        ]
+        lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+    return (
+        "<table><thead><tr><th>object</th><th>named right</th><th>unknown, when never met</th>"
+        "<th>height RMS (mm)</th><th>Chamfer (mm)</th></tr></thead>"
+        f"<tbody>{''.join(lines)}</tbody></table>"
+    )
+
+
+def _middle_of(near: list[Any]) -> tuple[str, str]:
+    if not near:
+        return "–", "–"
+    rms = float(np.sqrt(np.nanmean([one.height_rms_mm**2 for one in near])))
+    return f"{rms:.2f}", f"{np.nanmean([one.chamfer_mm for one in near]):.2f}"
+
+
+def _trials(found: Comparison) -> str:
+    lines = []
+    for sample, label, answer, stranger, vector in zip(
+        found.samples, found.labels, found.answers, found.strangers, found.vectors, strict=True
+    ):
+        right = answer.shape == label
+        said = html.escape(clouds.title_of(answer.shape or "unknown"))
+        shown = f'<span class="{"same" if right else "other"}">{said}</span>'
+        never = "unknown" if not stranger.known else clouds.title_of(stranger.nearest)
+        cells = [
+            html.escape(sample.name), html.escape(clouds.title_of(label)), shown,
+            f"{answer.confidence:.1%}", html.escape(never),
+            *(f"{value:.2f}" for value in vector),
+        ]  # fmt: skip
+        lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+    head = "".join(f"<th>{html.escape(feature.name)}</th>" for feature in FEATURES)
+    return (
+        "<table><thead><tr><th>scan</th><th>object</th><th>named</th><th>sure</th>"
+        f"<th>shape never met</th>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    )
+
+
+def _csv(path: Path, found: Comparison) -> Path:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(
+            ("scan", "object", "named", "confidence", "fit", "known_without_its_shape",
+             "tsne_1", "tsne_2", "height_rms_mm", "chamfer_mm",
+             *(feature.name for feature in FEATURES))
+        )  # fmt: skip
+        for index, sample in enumerate(found.samples):
+            answer, near = found.answers[index], found.nearness[index]
+            writer.writerow(
+                (sample.name, found.labels[index], answer.shape or "unknown",
+                 f"{answer.confidence:.4f}", f"{answer.fit:.3g}",
+                 "yes" if found.strangers[index].known else "no",
+                 *(f"{value:.4f}" for value in found.plane[index]),
+                 *((f"{near.height_rms_mm:.4f}", f"{near.chamfer_mm:.4f}") if near else ("", "")),
+                 *(f"{value:.5f}" for value in found.vectors[index]))
+            )  # fmt: skip
+    return path

@@ -1,0 +1,250 @@
+"""The report of a study: what each combination gave, every run's map, and what failed."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from setae.errors import InputError
+from setae.experiments.study import MAP, RUNS, Row
+from setae.heightmap import HeightMap
+from setae.perception import maps
+from setae.report import clouds, files, palette, style, template
+from setae.report.files import Report
+
+__all__ = ["measures_picture", "runs_picture", "write"]
+
+_COLUMNS = 8
+_ROWS = 8
+_MEASURES = (
+    ("robot_s", "robot’s time (s)"),
+    ("height_rms_mm", "height RMS (mm)"),
+    ("chamfer_mm", "Chamfer (mm)"),
+)
+
+
+def write(
+    rows: Sequence[Row], varied: Sequence[str], out: str | Path, *, page: str = "report.html"
+) -> Report:
+    """Write the report of a study.
+
+    Parameters
+    ----------
+    rows
+        Lines of its runs.
+    varied
+        Keys of the configuration that it varies.
+    out
+        The study's folder.
+    page
+        Name of the page in it.
+
+    Raises
+    ------
+    LogError
+        The folder can't be written to.
+    ExtraMissingError
+        Matplotlib isn't installed.
+    """
+    folder = Path(out)
+    drawn: list[Path] = []
+    with files.writing(folder):
+        (folder / "pictures").mkdir(exist_ok=True)
+        done = [row for row in rows if row["status"] == "done"]
+        if done:
+            drawn.append(measures_picture(folder / "pictures" / "measures.png", done, varied))
+            drawn.append(runs_picture(folder / "pictures" / "runs.png", done, folder))
+        (folder / page).write_text(_page(rows, varied, drawn), encoding="utf-8")
+    return Report(page=folder / page, pictures=tuple(drawn), tables=())
+
+
+def _case(row: Row, varied: Sequence[str]) -> str:
+    """Name of a run's combination, without object and seed."""
+    changes = [f"{_short(key)} {_shown(row.get(key))}" for key in varied]
+    return ", ".join([str(row["mode"]), *changes])
+
+
+def _short(key: str) -> str:
+    return key.removeprefix("simulator.").removesuffix("_name").rpartition(".")[2]
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)
+
+
+# ---------------------------------------------------------------------------- pictures
+
+
+def measures_picture(path: Path, done: Sequence[Row], varied: Sequence[str]) -> Path:
+    """Draw each measure of every run, by object and combination."""
+    shapes = list(dict.fromkeys(str(row["object"]) for row in done))
+    cases = list(dict.fromkeys(_case(row, varied) for row in done))
+    with style.used():
+        height = 3.4 + 0.26 * len(cases)
+        figure = style.figure(13.0, height)
+        figure.text(0.015, 1 - 0.15 / height, "What the runs gave", fontsize=15, weight="bold",
+                    va="top")  # fmt: skip
+        figure.text(0.015, 1 - 0.5 / height, f"Simulated. {len(done)} runs; a dot is a run, a bar "
+                    "the middle one.", fontsize=10, color=palette.MUTED, va="top")  # fmt: skip
+        grid = figure.add_gridspec(1, len(_MEASURES), left=0.045, right=0.99, wspace=0.2,
+                                   bottom=(0.65 + 0.26 * len(cases)) / height,
+                                   top=1 - 0.95 / height)  # fmt: skip
+        for index, (name, title) in enumerate(_MEASURES):
+            axes = figure.add_subplot(grid[index])
+            _draw_measure(axes, done, varied, name, shapes, cases)
+            axes.set_title(title, fontsize=11, pad=6)
+        handles, labels = axes.get_legend_handles_labels()
+        figure.legend(handles, labels, frameon=False, loc="lower left", ncols=1, fontsize=9,
+                      bbox_to_anchor=(0.035, 0.0))  # fmt: skip
+        style.save(figure, path)
+    return path
+
+
+def _draw_measure(
+    axes: Any,
+    done: Sequence[Row],
+    varied: Sequence[str],
+    name: str,
+    shapes: Sequence[str],
+    cases: Sequence[str],
+) -> None:
+    width = 0.8 / len(cases)
+    for number, case in enumerate(cases):
+        colour = clouds.SHAPE_COLOURS[number % len(clouds.SHAPE_COLOURS)]
+        x, y = [], []
+        for place, shape in enumerate(shapes):
+            values = [
+                float(row[name])
+                for row in done
+                if row["object"] == shape
+                and _case(row, varied) == case
+                and row.get(name) is not None
+            ]
+            middle = place - 0.4 + width * (number + 0.5)
+            x += list(middle + np.linspace(-0.25, 0.25, len(values)) * width)
+            y += values
+            if values:
+                axes.hlines(np.median(values), middle - 0.38 * width, middle + 0.38 * width,
+                            color=colour, lw=2)  # fmt: skip
+        axes.scatter(x, y, s=14, color=colour, alpha=0.6, linewidths=0, label=case)
+    axes.set_xticks(range(len(shapes)), [clouds.title_of(s).replace(" ", "\n") for s in shapes],
+                    fontsize=9)  # fmt: skip
+    axes.set_xlim(-0.5, len(shapes) - 0.5)
+    axes.set_ylim(bottom=0)
+    axes.grid(axis="y", color=palette.GRID)
+    axes.set_axisbelow(True)
+
+
+def runs_picture(path: Path, done: Sequence[Row], folder: Path) -> Path:
+    """Draw the height maps of the first runs."""
+    shown: list[tuple[Row, HeightMap]] = []
+    for row in done:
+        if len(shown) < _COLUMNS * _ROWS:
+            try:
+                shown.append((row, maps.read(folder / RUNS / str(row["run"]) / MAP)))
+            except InputError:
+                continue  # the table has it; its map was taken away
+    columns = min(_COLUMNS, max(len(shown), 1))
+    count = -(-max(len(shown), 1) // columns)
+    with style.used():
+        width, height = 1.6 * columns + 0.5, 1.95 * count + 0.9
+        width = max(width, 6.0)
+        figure = style.figure(width, height)
+        figure.text(0.2 / width, 1 - 0.15 / height, "Height maps from above", fontsize=15,
+                    weight="bold", va="top")  # fmt: skip
+        more = f" The first {len(shown)} of {len(done)} runs." if len(shown) < len(done) else ""
+        figure.text(0.2 / width, 1 - 0.5 / height, "Each in its own colours, blue deep and red "
+                    f"high.{more}", fontsize=10, color=palette.MUTED, va="top")  # fmt: skip
+        grid = figure.add_gridspec(count, columns, left=0.2 / width, right=1 - 0.2 / width,
+                                   bottom=0.3 / height, top=1 - 0.8 / height, wspace=0.1,
+                                   hspace=0.25)  # fmt: skip
+        for index, (row, heights) in enumerate(shown):
+            axes = figure.add_subplot(grid[divmod(index, columns)])
+            felt = heights.height_mm[np.isfinite(heights.height_mm)]
+            low, high = (felt.min(), felt.max()) if len(felt) else (0.0, 1.0)
+            clouds.draw_map(axes, heights, low_mm=float(low), high_mm=float(high))
+            name = f"{clouds.title_of(str(row['object']))} {row['seed']}\n{row['mode']}"
+            axes.set_xlabel(name, fontsize=7.5)
+        style.save(figure, path)
+    return path
+
+
+# -------------------------------------------------------------------------------- page
+
+
+def _page(rows: Sequence[Row], varied: Sequence[str], drawn: Sequence[Path]) -> str:
+    failed = [row for row in rows if row["status"] != "done"]
+    badges = '<span class="badge">Simulated: no hardware</span>'
+    if failed:
+        badges += f'<span class="badge warn">{len(failed)} runs failed; see below</span>'
+    words = ("What each measure came to, by object", "Height maps of the runs")
+    pictures = [template.image(path, text) for path, text in zip(drawn, words, strict=False)] + [
+        "",
+        "",
+    ]
+    shapes = len({row["object"] for row in rows})
+    seeds = len({row["seed"] for row in rows})
+    return template.fill(
+        "study.html",
+        {
+            "css": template.text("page.css"),
+            "badges": badges,
+            "finding": f"{len(rows) - len(failed)} of {len(rows)} runs are done: {shapes} "
+            f"objects, {seeds} seeds, {len({_case(row, varied) for row in rows})} combinations.",
+            "measures": pictures[0],
+            "maps": pictures[1],
+            "cases": _cases(rows, varied),
+            "failed": _failed(failed),
+            "runs": _runs(rows, varied),
+        },
+    )
+
+
+def _cases(rows: Sequence[Row], varied: Sequence[str]) -> str:
+    lines = []
+    for case in dict.fromkeys(_case(row, varied) for row in rows):
+        some = [row for row in rows if _case(row, varied) == case]
+        done = [row for row in some if row["status"] == "done"]
+        cells = [html.escape(case), str(len(done)), str(len(some) - len(done))]
+        for name, _ in _MEASURES:
+            values = np.array([row[name] for row in done if row.get(name) is not None], float)
+            if not len(values):
+                cells.append("–")
+            elif name == "height_rms_mm":
+                cells.append(f"{np.sqrt(np.mean(values**2)):.2f}")
+            else:
+                cells.append(f"{values.mean():.3g}")
+        lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+    head = "".join(f"<th>{title}</th>" for _, title in _MEASURES)
+    return (
+        f"<table><thead><tr><th>combination</th><th>done</th><th>failed</th>{head}</tr></thead>"
+        f"<tbody>{''.join(lines)}</tbody></table>"
+    )
+
+
+def _failed(failed: Sequence[Row]) -> str:
+    if not failed:
+        return "<p>None.</p>"
+    items = "".join(
+        f"<li><b>{html.escape(str(row['run']))}</b>: {html.escape(str(row['error']))}</li>"
+        for row in failed
+    )
+    return f"<ul>{items}</ul>"
+
+
+def _runs(rows: Sequence[Row], varied: Sequence[str]) -> str:
+    names = ["object", "seed", "mode", *varied, "status", "touched", "doubtful",
+             *(name for name, _ in _MEASURES), "wall_s"]  # fmt: skip
+    lines = []
+    for row in rows:
+        cells = (html.escape(_shown(row[name])) if row.get(name) is not None else "–"
+                 for name in names)  # fmt: skip
+        lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
