@@ -12,7 +12,7 @@ from setae import record
 from setae.config import Config, load, loads
 from setae.errors import ConfigError, InputError, LogError, SetaeError
 from setae.experiments import scan
-from setae.experiments.study.conduct import RUNS
+from setae.experiments.study.conducting import RUNS
 from setae.experiments.study.one import MAP
 from setae.heightmap import HeightMap
 from setae.objects import ScanObject, TableScene

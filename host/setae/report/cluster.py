@@ -75,7 +75,7 @@ def clouds_picture(path: Path, found: Comparison) -> Path:
                     fontsize=16, weight="bold", va="top")  # fmt: skip
         figure.text(0.02, 1 - 0.72 * (1 - top), _note(found), fontsize=10, color=palette.MUTED,
                     va="top")  # fmt: skip
-        grid = figure.add_gridspec(rows, columns, left=0.02, right=0.97, bottom=0.04,
+        grid = figure.add_gridspec(rows, columns, left=0.02, right=0.97, bottom=0.085,
                                    top=top - 0.05, wspace=0.12, hspace=0.2)  # fmt: skip
         places = [grid[divmod(index, columns)] for index in range(rows * columns)]
         for index, (shape, place) in enumerate(zip(shapes, places, strict=False)):
@@ -137,7 +137,7 @@ def trials_picture(path: Path, found: Comparison) -> Path:
                 if column == 0:
                     axes.set_ylabel(clouds.title_of(shape), fontsize=10, weight="bold")
         scale = figure.add_axes((1 - 0.85 / width, 0.3 / height, 0.16 / width, 1 - 1.25 / height))
-        figure.colorbar(drawn, cax=scale).set_label("height below the arm (mm)", fontsize=9)
+        figure.colorbar(drawn, cax=scale).set_label("height, from the arm's start (mm)", fontsize=9)
         scale.tick_params(labelsize=8)
         style.save(figure, path)
     return path

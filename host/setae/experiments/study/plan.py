@@ -95,6 +95,11 @@ class Plan:
     keep_logs: bool = False
 
     def __post_init__(self) -> None:
+        count = len(self.objects) * len(self.seeds) * len(self.modes)
+        for values in self._varied().values():
+            count *= len(values)
+        if count > _RUNS_MAX:
+            raise InputError(f"study: {count} runs are too many.", "Give fewer combinations.")
         _require_some("objects", self.objects, (*SHAPES, EMPTY))
         _require_some("seeds", self.seeds)
         _require_some("modes", self.modes, MODES)
@@ -105,11 +110,6 @@ class Plan:
         bad = [seed for seed in self.seeds if isinstance(seed, bool) or not isinstance(seed, int)]
         if bad or min(self.seeds) < 0:
             raise InputError("study: a seed is a whole number from 0.", "Give such seeds.")
-        count = len(self.objects) * len(self.seeds) * len(self.modes)
-        for values in self._varied().values():
-            count *= len(values)
-        if count > _RUNS_MAX:
-            raise InputError(f"study: {count} runs are too many.", "Give fewer combinations.")
         # Before anything runs, every value has been tried.
         for changes in self._combinations():
             robot.replaced(self.config, changes)

@@ -9,7 +9,7 @@ from typing import Any
 
 from setae import extras
 from setae.errors import InputError
-from setae.experiments.study.conduct import Row
+from setae.experiments.study.conducting import Row
 
 __all__ = ["read_table", "write_table"]
 

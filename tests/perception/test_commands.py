@@ -1,0 +1,97 @@
+"""`setae cloud`, `cluster` and `classify`, from files to answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.perception.synthetic import CONFIG, REACH_MM, felt
+
+from setae.cli import main
+from setae.config import Config, replaced
+from setae.errors import InputError
+from setae.experiments import samples, scan
+from setae.experiments.shapes import compare
+from setae.objects import SHAPES, ScanObject, random_object, table_scene
+from setae.perception import cloud, maps
+from setae.report import cluster as pages
+
+SEEDS = range(110, 113)
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    captured = capsys.readouterr()
+    assert ended.value.code == code, captured.err
+    return captured.out if code == 0 else captured.err
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Maps of real scans, as it were: only whoever scanned knows what they are."""
+    folder = tmp_path_factory.mktemp("maps")
+    words = []
+    for shape in SHAPES:
+        for seed in SEEDS:
+            path = folder / f"{shape}-{seed}.npz"
+            maps.write(path, felt(random_object(shape, seed), seed=seed))
+            words.append(f"{shape}={path}")
+    return words
+
+
+def test_what_was_compared_is_known_later_and_what_was_not_is_unknown(
+    given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "shapes.json"
+    known = [word for word in given if not word.startswith("coil=")]
+    out = tmp_path / "out"
+    printed = told(capsys, "cluster", *known, "--out", str(out), "--model", str(model))
+    assert "Named right 100%" in printed
+    page = (out / "report.html").read_text()
+    assert "12 of 12 scans are named right" in page
+    assert (out / "trials.csv").read_text().count("\n") == 13
+    for name, answer in (("orange", "orange"), ("coil", "unknown")):
+        path = tmp_path / f"new-{name}.npz"
+        maps.write(path, felt(random_object(name, 150), seed=150))
+        line = told(capsys, "classify", str(path), "--model", str(model)).splitlines()[1]
+        assert line.split()[1] == answer
+
+
+def test_scans_of_the_simulator_know_what_they_are_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small: Config = replaced(CONFIG, {"scan.area_mm": [40, 40], "scan.step_mm": 20})
+    what = ScanObject(shape="lidded_container", x_mm=20, y_mm=20)
+    log = tmp_path / "run" / "scan.mcap"
+    log.parent.mkdir()
+    scene = table_scene(small, what)
+    result = scan.simulate(small, scene, mode="adaptive", log=log)
+    (sample,) = samples.read(log.parent)
+    assert sample.label == "lidded_container"
+    assert sample.reach_mm == REACH_MM
+    assert sample.scene == scene
+    told(capsys, "cloud", str(log), "--format", "ply", "--format", "map",
+         "--out", str(tmp_path / "cloud"))  # fmt: skip
+    points = cloud.read(tmp_path / "cloud" / "scan.ply").points_mm
+    assert (points == result.height_map.points_mm()).all()
+    assert (maps.read(tmp_path / "cloud" / "scan-map.npz").mark == result.height_map.mark).all()
+
+
+def test_what_is_missing_is_told(given: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    path = given[0].partition("=")[2]
+    assert "NAME=PATH" in told(capsys, "cluster", path, given[5], given[9], code=1)
+    assert "nothing to compare" in told(capsys, "cluster", given[0], code=1)
+    assert "There is no" in told(capsys, "cloud", "nowhere", code=1)
+    assert "setae cluster --model" in told(capsys, "classify", path, "--model", path, code=1)
+
+
+def test_a_report_without_truth_has_no_measures_against_it(
+    given: list[str], tmp_path: Path
+) -> None:
+    found = compare(samples.read_all(given))
+    assert found.nearness == (None,) * len(given)
+    page = pages.write(found, tmp_path).page.read_text()
+    assert "Chamfer distance" not in page
+    with pytest.raises(InputError, match="nothing to compare"):
+        compare(found.samples[:2])

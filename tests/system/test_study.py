@@ -1,0 +1,180 @@
+"""Many simulated scans: what is done is kept, what fails is told, what is left is done later."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from setae.cli import main
+from setae.errors import ConfigError, InputError, SetaeError
+from setae.experiments import study
+from setae.experiments.study import Outcome, Run, conduct, perform
+
+# Nine places on the object: a tenth of a second of computing.
+SMALL = ["scan.area_mm=[20,20]", "scan.step_mm=20"]
+# So long a retracted robot can't step over anything.
+TALL = "scan.retracted_length_mm=0,60"
+
+
+def plan(**options: object) -> study.Plan:
+    given = {"objects": ["lidded_container"], "seeds": 1, "vary": SMALL, **options}
+    return study.of_options(**given)  # type: ignore[arg-type]  # as a command gives them
+
+
+def never(run: Run) -> Outcome:
+    raise AssertionError(f"{run.name} was done again")
+
+
+def test_a_failed_run_is_told_and_the_others_go_on(tmp_path: Path) -> None:
+    runs = plan(vary=[*SMALL, TALL]).runs()
+    rows = conduct(runs, tmp_path, workers=1)
+    assert [row["status"] for row in rows] == ["done", "failed"]
+    assert rows[0]["scan.retracted_length_mm"] == 0
+    assert rows[0]["places"] == 4
+    assert rows[0]["robot_s"] > 0
+    assert "Raise the arm" in rows[1]["error"]
+    # Again: what is done is not done anew, what failed is tried again.
+    tried: list[str] = []
+
+    def noted(run: Run) -> Outcome:
+        tried.append(run.name)
+        return perform(run)
+
+    assert conduct(runs, tmp_path, workers=1, task=noted)[0] == rows[0]
+    assert tried == [runs[1].name]
+
+
+def test_a_table_has_a_line_for_each_run(tmp_path: Path) -> None:
+    rows = conduct(plan(vary=[*SMALL, TALL]).runs(), tmp_path, workers=1)
+    read = study.read_table(study.write_table(tmp_path / "table.parquet", rows))
+    assert [row["status"] for row in read] == ["done", "failed"]
+    assert read[0]["robot_s"] == rows[0]["robot_s"]
+    assert read[1]["robot_s"] is None
+    assert json.loads(read[0]["scan.area_mm"]) == [20, 20]
+
+
+def test_processes_share_the_runs_and_give_what_one_gives(tmp_path: Path) -> None:
+    runs = plan(seeds=3).runs()
+    alone = conduct(runs, tmp_path / "alone", workers=1)
+    together = conduct(runs, tmp_path / "together", workers=2)
+    timeless = [[{**row, "wall_s": 0} for row in rows] for rows in (alone, together)]
+    assert timeless[0] == timeless[1]
+    for run in runs:
+        maps = [tmp_path / folder / study.RUNS / run.name / study.MAP
+                for folder in ("alone", "together")]  # fmt: skip
+        assert maps[0].read_bytes() == maps[1].read_bytes()
+    assert conduct(runs, tmp_path / "together", workers=2, task=never) == together
+
+
+def test_a_bug_in_a_run_is_kept_with_its_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("no reason")
+
+    monkeypatch.setattr("setae.experiments.study.one.simulate", broken)
+    runs = plan().runs()
+    rows = conduct(runs, tmp_path, workers=1)
+    assert rows[0]["error"] == "ZeroDivisionError: no reason"
+    text = (tmp_path / study.RUNS / runs[0].name / "traceback.txt").read_text()
+    assert "in broken" in text
+
+
+def test_half_written_lines_and_other_runs_do_not_count(tmp_path: Path) -> None:
+    runs = plan(seeds=2).runs()
+    folder = tmp_path / study.RUNS / runs[0].name
+    folder.mkdir(parents=True)
+    (folder / "row.json").write_text('{"status": "do')
+    done: list[str] = []
+
+    def quick(run: Run) -> Outcome:
+        done.append(run.name)
+        return Outcome(row={"run": run.name, "status": "done"})
+
+    conduct(runs[:1], tmp_path, workers=1, task=quick)
+    conduct(runs, tmp_path, workers=1, task=quick)
+    assert done == [run.name for run in runs]
+
+
+def test_the_name_of_a_run_changes_with_all_that_it_is_made_of() -> None:
+    base = plan().runs()[0]
+    others = [
+        plan(seeds=2).runs()[1],
+        plan(modes=["safe"]).runs()[0],
+        plan(plants=["paper_like"]).runs()[0],
+        plan(vary=["scan.area_mm=[20,20]"]).runs()[0],
+    ]
+    assert len({run.name for run in (base, *others)}) == 5
+    assert plan().runs()[0] == base
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: plan(objects=["lemon"]), "'lemon'"),
+        (lambda: plan(modes=["quick"]), "'quick'"),
+        (lambda: plan(seeds=0), "seeds"),
+        (lambda: plan(vary=["scan.step_mm"]), "no key with its values"),
+        (lambda: plan(vary=["scan.step_mm=10,10"]), "twice"),
+        (lambda: plan(vary=["scan.stride_mm=10"]), "stride_mm"),
+        (lambda: plan(vary=["scan.step_mm=-1"]), "step_mm"),
+        (lambda: plan(seeds=100_001), "too many"),
+    ],
+)
+def test_what_can_not_be_is_told_before_anything_runs(
+    make: Callable[[], study.Plan], words: str
+) -> None:
+    with pytest.raises((InputError, ConfigError), match=words):
+        make()
+
+
+def test_a_file_says_the_same_as_options(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text("[bristle]\nthreshold_hpa = 12\n")
+    file = tmp_path / "study.toml"
+    file.write_text(
+        '[study]\nobjects = ["eraser", "none"]\nseeds = [3, 5]\nmodes = "safe"\n'
+        'plants = ["ideal", "paper_like"]\nconfig = "robot.toml"\n'
+        "[vary]\nscan.step_mm = [10, 20]\n"
+    )
+    runs = study.load(file).runs()
+    assert len(runs) == 2 * 2 * 2 * 2
+    assert runs[-1].object == "none"
+    assert dict(runs[-1].changes) == {"simulator.plant_name": "paper_like", "scan.step_mm": 20}
+    assert "threshold_hpa = 12.0" in runs[0].config
+    file.write_text("[study]\nsaeds = 3\n")
+    with pytest.raises(InputError, match="saeds"):
+        study.load(file)
+
+
+def test_a_scheduler_that_is_not_there_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("setae.experiments.study.conducting._CONNECT_S", 0.2)
+    with pytest.raises(SetaeError, match=r"no scheduler at tcp://127\.0\.0\.1:9"):
+        conduct(plan().runs(), tmp_path, scheduler="tcp://127.0.0.1:9")
+    with pytest.raises(InputError, match="workers"):
+        conduct(plan().runs(), tmp_path, scheduler="tcp://127.0.0.1:9", workers=2)
+
+
+def test_the_command_leaves_table_and_report_and_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "study"
+    command = ["study", "--object", "lidded_container", "--seeds", "1", "--vary", SMALL[0],
+               "--vary", SMALL[1], "--vary", TALL, "--workers", "1", "--out", str(out)]  # fmt: skip
+    with pytest.raises(SystemExit) as ended:
+        main(command)
+    printed = capsys.readouterr().out
+    assert ended.value.code == 0
+    assert "1 runs are done, 1 failed" in printed
+    assert "Raise the arm" in printed
+    page = (out / "report.html").read_text()
+    assert "1 runs failed" in page
+    assert "Raise the arm" in page
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--no-report"])
+    assert ended.value.code == 0
+    assert "1 runs are done, 1 failed" in capsys.readouterr().out
