@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from setae.experiments.study.one import MAP
 from setae.heightmap import HeightMap
 from setae.objects import ScanObject, TableScene
 from setae.perception import maps
+from setae.record import Log
 from setae.solids import Solid
 
 __all__ = ["Sample", "read", "read_all"]
@@ -72,8 +73,8 @@ def read(given: str | Path) -> list[Sample]:
     Parameters
     ----------
     given
-        A log; a folder with the logs of one scan; a study's folder, with many; a height map
-        (``.npz``). ``NAME=PATH`` says what was scanned: a real scan doesn't know.
+        A log; a folder with the logs of scans; a study's folder; a height map (``.npz``).
+        ``NAME=PATH`` says what was scanned: a real scan doesn't know.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def read(given: str | Path) -> list[Sample]:
     elif (path / MAP).is_file():
         found = [_of_run(path)]
     else:
-        found = [_of_logs(path)]
+        found = _of_logs(path)
     if not found:
         raise InputError(f"{path} holds no finished run.", "Let the study go on.")
     if label is None:
@@ -133,22 +134,30 @@ def _of_map(path: Path) -> Sample:
     )
 
 
-def _of_logs(path: Path) -> Sample:
-    paths = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+def _of_logs(path: Path) -> list[Sample]:
+    if not path.is_dir():
+        return [_of_parts([record.read(path)], path.stem)]
+    paths = sorted(path.glob("*.mcap"))
     if not paths:
         raise LogError(f"{path} holds no log.", "Give the folder that `setae scan` wrote.")
-    logs = [record.read(one) for one in paths]
-    result = scan.read_logs(logs)
+    scans = scan.scans_of([record.read(one) for one in paths])
+    # A folder with several scans has one for each mode.
+    names = [path.name if len(scans) == 1 else f"{path.name}-{s[0].path.stem}" for s in scans]
+    return [_of_parts(parts, name) for parts, name in zip(scans, names, strict=True)]
+
+
+def _of_parts(logs: Sequence[Log], name: str) -> Sample:
+    result = scan.read_parts(logs)
     scene = _scene(result.scene) if logs[0].simulated else None
     try:
-        config = loads(str(logs[0].metadata.get("config", "")), source=str(paths[0]))
+        config = loads(str(logs[0].metadata.get("config", "")), source=str(logs[0].path))
     except ConfigError as error:
-        raise LogError(f"The configuration in {paths[0]} can't be used.", str(error)) from error
+        raise LogError(f"The configuration in {logs[0].path} can't be used.", str(error)) from error
     origin = "measured on the robot"
     if logs[0].simulated:
         origin = f"simulated, plant {config.plant}, mode {result.mode}"
     return Sample(
-        name=path.stem if path.is_file() else path.name,
+        name=name,
         label=scene.object.shape if scene and scene.object else None,
         heights=result.height_map,
         reach_mm=_reach_mm(config),
