@@ -16,6 +16,8 @@ PIO := .ci/platformio/pio
 PORT ?=
 FUZZ_SECONDS ?= 600
 FUZZ_JOBS ?= 1
+# A file's tests stay together: they share what is costly to make.
+ON_ALL_CORES := --numprocesses auto --dist loadfile
 
 NATIVE_SOURCES := CMakeLists.txt $(shell find firmware/lib simulator -name '*.cpp' -o -name '*.h')
 # The simulated UNO, for tests only: simavr is GPL, and nothing of it is shipped.
@@ -157,9 +159,9 @@ model: .venv/.dev ## check the model of link and states whole, and count its sta
 	$(BIN)/python -m tests.model.checker
 
 .PHONY: pytest
-pytest: .venv/.dev firmware $(AVR_LIBRARY) $(BOOTLOADER) ## the Python tests
+pytest: .venv/.dev firmware $(AVR_LIBRARY) $(BOOTLOADER) ## the Python tests, on all cores
 	@.ci/need $(MODEL_PACKAGES) $(FUZZ_PACKAGES)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(ON_ALL_CORES)
 
 .PHONY: fuzz
 fuzz: .venv/.dev ## fuzz firmware and host, FUZZ_SECONDS each target; noted in tests/fuzz/runs.json
@@ -175,7 +177,7 @@ line-stress: .venv/.dev ## a million commands over a bad line, noted in tests/sy
 
 .PHONY: avr
 avr: .venv/.dev firmware $(AVR_LIBRARY) $(BOOTLOADER) ## the built firmware's tests, in a cycle-accurate UNO
-	$(BIN)/python -m pytest tests/avr
+	$(BIN)/python -m pytest $(ON_ALL_CORES) tests/avr
 
 $(AVR_LIBRARY): $(AVR_SOURCES)
 	@.ci/need compiler $(AVR_PACKAGES)

@@ -9,7 +9,9 @@ import pytest
 from hypothesis import settings
 
 # How long an example takes is the machine's affair: a busy one failed a test of the kinematics.
-settings.register_profile("setae", deadline=None)
+# The same examples every time; `--hypothesis-profile search` draws others.
+settings.register_profile("setae", deadline=None, derandomize=True)
+settings.register_profile("search", deadline=None)
 settings.load_profile("setae")
 
 ROOT = Path(__file__).resolve().parents[1]

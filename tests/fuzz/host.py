@@ -29,6 +29,8 @@ from setae_protocol.messages import Disarm, Enable, Record, Segment, Segments
 _STEP_US: Final = 10_000
 _CALM_US: Final = 9_000_000
 """After this on a good line every command has an end: 20 tries take 8 s at most."""
+_AFTER_US: Final = 300_000
+"""What happens twice, or too late, happens within this."""
 
 
 class _Play:
@@ -51,6 +53,7 @@ class _Play:
                 self.board.on_frame_start()
             self.engine.poll(self.now_us)
             self.exchange(line)
+            self.engine.poll(self.now_us)  # what came may have made something due at once
             due_us = self.engine.next_deadline_us
             assert due_us is None or due_us > self.now_us, "a wait that never ends"
 
@@ -105,7 +108,10 @@ def engine(data: bytes) -> None:
             play.engine.receive(garbage, play.now_us)
         else:
             play.wait((1 + action % 16) * _STEP_US, line)
-    play.wait(_CALM_US, bytes)
+    end_us = play.now_us + _CALM_US
+    while play.now_us < end_us and not all(ticket.done for ticket in play.tickets):
+        play.wait(_STEP_US, bytes)
+    play.wait(_AFTER_US, bytes)
     assert all(ticket.done for ticket in play.tickets), "a command without an end"
     if play.engine.phase is Phase.FAILED:
         assert play.engine.error is not None
