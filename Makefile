@@ -157,6 +157,7 @@ wheel: .venv/.dev ## build sdist and wheel, and run what they install outside th
 model: .venv/.dev ## check the model of link and states whole, and count its states (minutes)
 	@.ci/need $(MODEL_PACKAGES)
 	$(BIN)/python -m tests.model.checker
+	$(BIN)/python -m tests.model.host_walk
 
 .PHONY: pytest
 pytest: .venv/.dev firmware $(AVR_LIBRARY) $(BOOTLOADER) ## the Python tests, on all cores

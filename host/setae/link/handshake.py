@@ -188,7 +188,8 @@ class Handshake:
                 token=self._hello_token,
             )
         )
-        self._repeat_at_us = now_us + _HELLO_REPEAT_US
+        if not self.in_session:
+            self._repeat_at_us = now_us + _HELLO_REPEAT_US
 
     def _settle(self, now_us: int) -> None:
         """Ask for what was latched before, so that it isn't taken for this session's."""

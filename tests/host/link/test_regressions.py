@@ -290,3 +290,16 @@ def test_a_stalled_host_repeats_nothing_that_was_answered() -> None:
     session.run_until(lambda: ticket.done, SECOND_US)
     assert session.engine.statistics.frames_retransmitted == 0
     assert ticket.state is TicketState.EXECUTED
+
+
+def test_a_silent_board_is_asked_for_its_records_every_50_ms() -> None:
+    """The question whether the session lives put the next one for the records off by 200 ms."""
+    line = ModelTransport()
+    session = Session(line, session_id=7)
+    session.engine.open(7, 0)
+    session.run_until(lambda: session.engine.phase is Phase.SETTLING, SECOND_US)
+    line.cut_off = True
+    before = len(line.sent)
+    session.run_for(SECOND_US)
+    asked = HostDecoder().feed(b"".join(line.sent[before:]))
+    assert sum(isinstance(frame.message, Recall) for frame in asked) >= 19 * len(Record)
