@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -244,6 +245,49 @@ def test_second_program_takes_over_and_the_first_is_told(world: World) -> None:
     second.run_for(SECOND_US)
     assert second.state is State.HOLDING
     assert len(shown.poses) <= 2
+
+
+class Shared:
+    """A port that another program has open too: what comes is read by either, both may write."""
+
+    simulated = True
+
+    def __init__(self, inner: SimTransport) -> None:
+        self.name, self.now_us, self.close = inner.name, inner.now_us, inner.close
+        self.others_part = 0.5
+        self._inner = inner
+        self._rng = random.Random(1)
+
+    def send(self, data: bytes) -> None:
+        if self._rng.random() < self.others_part:
+            self._inner.send(b"AT\r\n")
+        self._inner.send(data)
+
+    def receive(self, deadline_us: int) -> tuple[bytes, int] | None:
+        while True:
+            received = self._inner.receive(deadline_us)
+            if received is None or self._rng.random() >= self.others_part:
+                return received
+
+
+def test_a_port_that_another_program_reads_too_costs_frames_and_no_command(world: World) -> None:
+    """Root's programs are not kept out. What they type runs into our frames."""
+    port = Shared(SimTransport(world))
+    session = Session(port, session_id=7)
+    shown = Shown(session)
+    session.open()
+    enable(session)
+    for step in range(40):
+        session.request(motion(session.epoch, frames=2, to_ticks=START_TICKS + 10 * step))
+    session.run_for(SECOND_US // 2)
+    assert session.engine.statistics.frames_lost > 10
+    assert session.engine.statistics.frames_retransmitted > 10
+    played = [telemetry.pulse_ticks[0] for telemetry in shown.telemetry if telemetry.attached]
+    assert played == sorted(played)
+    assert played[-1] == START_TICKS + 10 * 39
+    port.others_part = 1.0
+    with pytest.raises(LinkLostError, match="silent for 4 s"):
+        session.run_for(5 * SECOND_US)
 
 
 # ------------------------------------------------------------------------ on a serial port

@@ -89,6 +89,22 @@ def test_a_program_that_takes_no_lock_is_kept_out_too(terminal: tuple[int, str])
     os.close(monitor)
 
 
+def test_no_second_setae_opens_the_port_and_of_other_programs_only_roots(
+    terminal: tuple[int, str],
+) -> None:
+    """The system keeps nobody out who may administer it; the lock keeps out whoever asks for it."""
+    _, name = terminal
+    transport = SerialTransport(name)
+    if os.geteuid() == 0:
+        os.close(os.open(name, os.O_RDWR | os.O_NOCTTY))
+    else:
+        with pytest.raises(OSError, match="busy"):
+            os.open(name, os.O_RDWR | os.O_NOCTTY)
+    with pytest.raises(PortBusyError, match=f"Another program holds {name}"):
+        SerialTransport(name)
+    transport.close()
+
+
 def test_pulled_cable(terminal: tuple[int, str]) -> None:
     board, name = terminal
     transport = SerialTransport(name)
