@@ -30,6 +30,7 @@ from bench import (  # noqa: E402  # needs the path
     line,
     link_model,
     motion,
+    perception,
     validation,
 )
 from bench import plant as plant_figures  # noqa: E402
@@ -287,6 +288,7 @@ FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     **damage.FIGURES,
     **link_model.FIGURES,
     **validation.FIGURES,
+    **perception.FIGURES,
     "random_obstacles": random_obstacles,
     "kinematics_speed": kinematics_speed,
     "motion_segments": motion_segments,

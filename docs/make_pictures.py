@@ -3,8 +3,8 @@
     python docs/make_pictures.py [RUN_DIR]
 
 Without a folder it runs the paper's five trials, its validation and the bristle's
-calibration in the simulator, seed 0. With one it draws the logs in it. The theory's
-and the protocol's pictures it draws in any case.
+calibration in the simulator, seed 0, and 25 scans of five objects. With one it draws the
+logs in it, or the scans of a study. The theory's and the protocol's pictures it draws in any case.
 """
 
 from __future__ import annotations
@@ -51,6 +51,13 @@ def draw_causes(run: Path) -> None:
     why.picture(PICTURES / "causes.png", effects, note)
 
 
+def draw_shapes(run: Path) -> None:
+    """Draw a study's scans side by side into docs/pictures."""
+    found = shapes.compare(samples.read(run))
+    cluster.clouds_picture(PICTURES / "clouds.png", found)
+    cluster.trials_picture(PICTURES / "shape_maps.png", found)
+
+
 def run_setae(*arguments: str) -> None:
     """Run the command in the simulator, without its report."""
     command = [sys.executable, "-m", "setae.cli", *arguments, "--sim", "--no-report"]
@@ -62,6 +69,9 @@ def main(arguments: list[str]) -> None:
     theory_pictures.draw(PICTURES)
     motion_pictures.draw(PICTURES)
     protocol_pictures.draw(PICTURES)
+    if arguments and (Path(arguments[0]) / study.RUNS).is_dir():
+        draw_shapes(Path(arguments[0]))
+        return
     if arguments:
         draw(Path(arguments[0]))
         return
@@ -80,6 +90,9 @@ def main(arguments: list[str]) -> None:
         felt = Path(folder) / "bristle"
         run_setae("calibrate", "bristle", "--moves", "200", "--touches", "200", "--out", str(felt))
         bristle.picture(PICTURES / "bristle.png", record.read(felt / "bristle.mcap"))
+        objects = Path(folder) / "objects"
+        study.conduct(study.Plan().runs(), objects)
+        draw_shapes(objects)
 
 
 if __name__ == "__main__":
