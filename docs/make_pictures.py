@@ -19,8 +19,8 @@ import protocol_pictures
 import theory_pictures
 
 from setae import record, tendons
-from setae.experiments import causes, runs
-from setae.report import animation, bristle, explore, pictures, validation_pictures
+from setae.experiments import causes, runs, samples, shapes, study
+from setae.report import animation, bristle, cluster, explore, pictures, validation_pictures
 from setae.report import causes as why
 from setae.report.trial import telling
 
