@@ -48,7 +48,11 @@ def test_each_plant_gives_the_papers_answer_or_the_report_says_why_not(
         assert section(trials) == ""
         return
     assert plant in told[0]  # how far beside its targets it went
+    same = "Every trial came out as the paper’s all the same."
     if row.agrees:
-        assert told[-1] == "Every trial came out as the paper’s all the same."
+        assert told[-1] == same
+        # It said so of trials that the paper doesn't have, too.
+        other = dataclasses.replace(trials[0], obstacle_below_tip_mm=20.0)
+        assert same not in sentences([other])
     else:
         assert "touched nothing" in section(trials) or "ended early" in section(trials)

@@ -109,6 +109,9 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_where_it_was(
     code, _, errors = run(capsys, *arguments, "--resume", "--config", str(other))
     assert code == 1
     assert "another configuration" in errors
+    code, _, errors = run(capsys, *arguments, "--resume", "--seed", "4")
+    assert code == 1
+    assert "another --seed" in errors  # it was gone on with
     code, _, errors = run(capsys, *arguments, "--resume")
     assert code == 0, errors
     (after,) = runs_in(out)

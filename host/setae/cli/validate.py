@@ -191,13 +191,24 @@ class _Drive:
         read = [record.read(log) for log in sorted(self._where_to().glob("*.mcap"))]
         for run in runs.read(runs.of_kind(read, runs.EXPERIMENT)):
             if run.model == model:
-                if run.config != self._config:
-                    raise InputError(
-                        f"The run in {self._where_to()} had another configuration.",
-                        "Resume it with the same --config and --plant, or begin a new one.",
-                    )
+                self._require_same(run)
                 return set(run.visited)
         return set()
+
+    def _require_same(self, run: runs.Run) -> None:
+        if run.config != self._config:
+            raise InputError(
+                f"The run in {self._where_to()} had another configuration.",
+                "Resume it with the same --config and --plant, or begin a new one.",
+            )
+        now = {"seed": self._where.seed, "noise_sd_mm": self._noise.sd_mm,
+               "noise_seed": self._noise.seed}  # fmt: skip
+        before = {name: run.metadata.get(name) for name in now}
+        if run.simulated and before != now:
+            raise InputError(
+                f"The run in {self._where_to()} had another --seed or another noise.",
+                "Resume it with the options of the first call, or begin a new one.",
+            )
 
     def _log(self, model: str) -> Path:
         log = self._where_to() / f"{model}.mcap"

@@ -40,12 +40,11 @@ def sentences(trials: Sequence[Trial]) -> list[str]:
             f"was touched, the spring’s top ended {np.mean(beside_mm):.1f} mm from its target on "
             f"average, {max(beside_mm):.1f} mm at most."
         )
-    differing = [
-        row.trial for row in compare(trials) if row.agrees is False or not row.trial.complete
-    ]
+    rows = compare(trials)
+    differing = [row.trial for row in rows if row.agrees is False or not row.trial.complete]
     for trial in differing:
         told += [f"Trial {trial.number} {text}" for text in _why(trial)]
-    if beside_mm and not differing:
+    if beside_mm and all(row.agrees for row in rows):
         told.append("Every trial came out as the paper’s all the same.")
     return told
 
