@@ -48,6 +48,9 @@ class Controls:
         self.on_command: OnCommand | None = None
         self._planner = Planner(config)
         self._pose_known = False
+        # What the last motion was to reach: under `paper` the lengths alone leave that open.
+        self._aim: Arc | None = None
+        self._aim_model = config.motion.model
         self._board = Board(session)
 
     # ------------------------------------------------------------------- life
@@ -154,9 +157,13 @@ class Controls:
 
     @property
     def pose(self) -> Arc:
-        """The commanded pose: the arc that fits the commanded lengths best."""
+        """The commanded pose: the arc that fits the commanded lengths best.
+
+        Of several that do, the one nearest to the last target. In the tendon model that
+        the last move was made with.
+        """
         return kinematics.forward(
-            self.lengths_mm, self.config.geometry, model=self.config.motion.model
+            self.lengths_mm, self.config.geometry, model=self._aim_model, near=self._aim
         )
 
     @property
@@ -341,6 +348,11 @@ class Controls:
     def host_time_us(self, frame: int, phase_us: int) -> int:
         """A board time on the session's clock."""
         return self._board.host_time_us(frame, phase_us)
+
+    def _aim_at(self, position_mm: npt.ArrayLike | None, model: str | None = None) -> None:
+        """Note where a motion under a tendon model ends; None: at lengths of no certain pose."""
+        self._aim = None if position_mm is None else kinematics.inverse(position_mm)
+        self._aim_model = model or self.config.motion.model
 
     def _told(self, name: str, **args: Any) -> None:
         if self.on_command is not None:

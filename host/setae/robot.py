@@ -7,6 +7,7 @@ The board keeps the robot safe on its own; nothing here is needed for that.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Literal
 
@@ -87,6 +88,7 @@ class Robot(Controls):
         self._told("move_to", position_mm=_list(position_mm), duration_s=duration_s,
                    speed_mm_s=speed_mm_s, model=model)  # fmt: skip
         self._move(lengths_mm, duration_s, speed_mm_s)
+        self._aim_at(position_mm, model)
 
     def move_lengths(
         self,
@@ -103,6 +105,7 @@ class Robot(Controls):
         self._told("move_lengths", lengths_mm=_list(lengths), duration_s=duration_s,
                    speed_mm_s=speed_mm_s)  # fmt: skip
         self._move(lengths, duration_s, speed_mm_s)
+        self._aim_at(None)
 
     def compress(
         self,
@@ -163,6 +166,7 @@ class Robot(Controls):
                    at_jump=at_jump)  # fmt: skip
         self._move(begin_mm, None, None)
         self._follow(motion)
+        self._aim_at(points[-1], model)
 
     def circle(
         self,
@@ -211,6 +215,9 @@ class Robot(Controls):
                    at_jump=at_jump)  # fmt: skip
         self._move(begin_mm, None, None)
         self._follow(motion)
+        end_rad = math.radians(start_deg + 360.0 * turns)
+        self._aim_at((radius_mm * math.cos(end_rad), radius_mm * math.sin(end_rad), height_mm),
+                     model)  # fmt: skip
 
     # -------------------------------------------------------------- guarded moves
 
@@ -268,9 +275,12 @@ class Robot(Controls):
         self._told("probe", position_mm=_list(position_mm), duration_s=duration_s,
                    retract_mm=None if retract_mm is None else _list(retract_mm))  # fmt: skip
         planned = self._planner.line(start, target, duration_s=duration_s)
-        return self._hold_again(
-            self._guarding.extend(planned, retract_ticks=retract, approach=approach)
-        )
+        found = self._guarding.extend(planned, retract_ticks=retract, approach=approach)
+        if found is None:
+            self._aim_at(position_mm)
+        elif retract_mm is not None:
+            self._aim_at(retract_mm)
+        return self._hold_again(found)
 
     def hold_guarded(
         self,
@@ -304,7 +314,10 @@ class Robot(Controls):
         self._told("hold_guarded", timeout_s=timeout_s,
                    retract_mm=None if retract_mm is None else _list(retract_mm))  # fmt: skip
         approach = Approach(begin=begin, busy=busy, abort=abort, timeout_s=timeout_s)
-        return self._hold_again(self._guarding.watch(approach, retract_ticks=retract))
+        found = self._guarding.watch(approach, retract_ticks=retract)
+        if found is not None and retract_mm is not None:
+            self._aim_at(retract_mm)
+        return self._hold_again(found)
 
     def contact_of(self, trip: Tripped) -> Contact:
         """What a trip's record tells about the contact."""

@@ -116,7 +116,20 @@ def test_the_place_of_a_contact_is_known_within_its_stated_uncertainty() -> None
         error_mm = np.linalg.norm(touching.backbone_mm[-1] - np.array(contact.position_mm))
         assert error_mm < contact.uncertainty_mm
         assert abs(contact.pressure_change_hpa) >= 15.0
-        assert abs(contact.time_us - touching.time_us) < 60_000
+        # From the side the filament only bends: a few millimetres until the pressure is there.
+        assert abs(contact.time_us - touching.time_us) < 100_000
+
+
+def test_the_robot_tells_the_pose_that_was_commanded() -> None:
+    """Under the paper's model the lengths fit other poses too, and (-2.2, 15.6, 29.9) was told."""
+    with compressed() as made:
+        robot = made.robot
+        robot.move_to((2.3, 15.6, 29.9))
+        assert robot.position_mm == pytest.approx((2.3, 15.6, 29.9), abs=0.1)
+        robot.move_to((20.0, 5.0, 55.0), model="taut")
+        assert robot.position_mm == pytest.approx((20.0, 5.0, 55.0), abs=0.1)
+        robot.circle(15.0, 60.0, turns=0.25, model="parallel")
+        assert robot.position_mm == pytest.approx((0.0, 15.0, 60.0), abs=0.1)
 
 
 def test_a_probe_into_free_space_ends_at_its_target() -> None:
