@@ -167,10 +167,8 @@ pytest: .venv/.dev firmware $(AVR_LIBRARY) $(BOOTLOADER) ## the Python tests, on
 .PHONY: fuzz
 fuzz: .venv/.dev ## fuzz firmware and host, FUZZ_SECONDS each target; noted in tests/fuzz/runs.json
 	@.ci/need $(FUZZ_PACKAGES)
-	$(BIN)/python tests/fuzz/fuzz.py --seconds $(FUZZ_SECONDS) --jobs $(FUZZ_JOBS)
 	@$(PIP) --no-build-isolation --editable '.[report,perception,study,dev,fuzz]'
-	for target in engine config log; do \
-	  $(BIN)/python tests/fuzz/atheris_host.py $$target -max_total_time=$(FUZZ_SECONDS) || exit 1; done
+	$(BIN)/python tests/fuzz/fuzz.py --seconds $(FUZZ_SECONDS) --jobs $(FUZZ_JOBS)
 
 .PHONY: line-stress
 line-stress: .venv/.dev ## a million commands over a bad line, noted in tests/system/link_runs.json

@@ -48,8 +48,15 @@ def fuzzing() -> Iterable[Figure]:
         f"`make fuzz`, as recorded in tests/fuzz/runs.json: {', '.join(parts)}; the last run on"
         f" {runs[-1]['date']}, commit {runs[-1]['commit']}",
     )
+    alarms = [run for run in runs if run.get("false_alarms")]
+    notes = [f"{run['target']} at {run['commit']}: {run['note']}" for run in alarms]
     yield Figure(
-        "fuzz_crashes", sum(run["crashes"] for run in runs), "runs", "of those: ended by a fault"
+        "fuzz_crashes",
+        sum(run["crashes"] for run in runs),
+        "inputs",
+        "of all those: on which the code under test crashed or broke a promise; besides,"
+        f" {sum(run['false_alarms'] for run in alarms)} at which an observer was wrong"
+        + "".join(f" ({note})" for note in notes),
     )
 
 

@@ -1,4 +1,4 @@
-"""Fuzz the firmware. `python tests/fuzz/fuzz.py --help` says how; README.md says what."""
+"""Fuzz firmware and host. `python tests/fuzz/fuzz.py --help` says how; README.md says what."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from tests.fuzz import building
 from tests.fuzz.building import BUILD, HERE, MAX_BYTES, ROOT, TARGETS
 
 RUNS = HERE / "runs.json"
+HOST_TARGETS = ("engine", "config", "log")
+HOST_MAX_BYTES = 200
 
 
 def options(target: str, max_bytes: int | None = None) -> list[str]:
@@ -53,6 +55,21 @@ def run_long(
     program = building.fuzzer(target)
     limits = [*options(target, max_bytes), f"-max_total_time={seconds}"]
     command = [str(program), *limits, str(corpus)]
+    return _run(target, command, seconds, jobs, max_bytes or MAX_BYTES[target])
+
+
+def run_host(target: str, seconds: int, corpus: Path) -> bool:
+    """Fuzz a part of the host with atheris, and write the run down."""
+    corpus.mkdir(parents=True, exist_ok=True)
+    command = [
+        sys.executable, str(HERE / "atheris_host.py"), target, f"-max_total_time={seconds}",
+        f"-max_len={HOST_MAX_BYTES}", "-print_final_stats=1",
+        f"-artifact_prefix={BUILD}/crash-{target}-", str(corpus),
+    ]  # fmt: skip
+    return _run(f"host {target}", command, seconds, 1, HOST_MAX_BYTES)
+
+
+def _run(target: str, command: Sequence[str], seconds: int, jobs: int, max_bytes: int) -> bool:
     running = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(jobs)]
     executions = crashes = 0
     for job in running:
@@ -62,7 +79,7 @@ def run_long(
         if job.returncode != 0:
             crashes += 1
             print(said[-4000:], file=sys.stderr)
-    record(target, executions, seconds, crashes=crashes, max_bytes=max_bytes or MAX_BYTES[target])
+    record(target, executions, seconds, crashes=crashes, max_bytes=max_bytes)
     return crashes == 0
 
 
@@ -92,7 +109,8 @@ def _commit() -> str:
             command, cwd=ROOT, capture_output=True, text=True, check=True
         ).stdout.strip()
 
-    changed = git("status", "--porcelain", "--", "firmware", "tests/fuzz", ":!tests/fuzz/runs.json")
+    sources = ["firmware", "host", "protocol", "tests/fuzz", ":!tests/fuzz/runs.json"]
+    changed = git("status", "--porcelain", "--", *sources)
     return git("rev-parse", "--short=10", "HEAD") + ("+" if changed else "")
 
 
@@ -140,7 +158,8 @@ def coverage() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do what the command line says."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--target", nargs="+", choices=TARGETS, default=list(TARGETS))
+    every = [*TARGETS, *HOST_TARGETS]
+    parser.add_argument("--target", nargs="+", choices=every, default=every)
     parser.add_argument("--seconds", type=int, default=600, help="for each target")
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
     parser.add_argument("--max-bytes", type=int, help="of an input: shorter ones run faster")
@@ -153,7 +172,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     good = True
     for target in chosen.target:
-        if chosen.minimise:
+        if target in HOST_TARGETS:
+            good &= chosen.minimise or run_host(target, chosen.seconds, chosen.corpus / target)
+        elif chosen.minimise:
             minimise(target, chosen.corpus / target)
         else:
             corpus = chosen.corpus / target
