@@ -17,6 +17,7 @@ from setae.arc import Arc, FloatArray, finite_array, positive
 from setae.config import Config
 from setae.errors import InputError, TrajectoryError, UnreachableError
 from setae.servo import Ticks
+from setae.trajectory.plan import TooFast
 from setae_protocol.messages import SERVO_FRAME_US, Segment, SetLimits
 
 Begun = tuple[FloatArray, trajectory.FrameTrajectory]
@@ -108,6 +109,7 @@ class Planner:
         *,
         duration_s: float | None = None,
         speed_mm_s: float | None = None,
+        too_fast: TooFast = "raise",
     ) -> Planned:
         """From pulses straight to tendon lengths, in a time or at the fastest tendon's speed."""
         limit = self.servos.max_speed_mm_s
@@ -128,6 +130,7 @@ class Planner:
             lengths_mm,
             limits=self._limits(limit),
             duration_s=duration_s,
+            too_fast=too_fast,
         )
         return self._packed(motion, start_ticks)
 

@@ -24,6 +24,7 @@ from setae.link.events import Tripped
 from setae.link.session import Session
 from setae.planning import require_one
 from setae.trajectory import FrameTrajectory
+from setae.trajectory.plan import TooFast
 
 __all__ = ["Approach", "Contact", "Robot"]
 
@@ -270,11 +271,13 @@ class Robot(Controls):
         if retract_mm is not None:
             retract = self._planner.ticks(self._planner.reach(retract_mm, None))
         require_one(duration_s, speed_mm_s)
+        too_fast: TooFast = "raise"
         if duration_s is None:
             duration_s = self._planner.extension_s(self.pose, position_mm, speed_mm_s)
+            too_fast = "stretch"  # a short way may be too short for its highest speed
         self._told("probe", position_mm=_list(position_mm), duration_s=duration_s,
                    retract_mm=None if retract_mm is None else _list(retract_mm))  # fmt: skip
-        planned = self._planner.line(start, target, duration_s=duration_s)
+        planned = self._planner.line(start, target, duration_s=duration_s, too_fast=too_fast)
         found = self._guarding.extend(planned, retract_ticks=retract, approach=approach)
         if found is None:
             self._aim_at(position_mm)

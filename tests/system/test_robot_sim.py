@@ -138,6 +138,14 @@ def test_a_probe_into_free_space_ends_at_its_target() -> None:
         assert made.robot.position_mm == pytest.approx(TARGET_MM, abs=0.1)
 
 
+def test_a_short_probe_takes_the_time_that_its_jerk_asks_for() -> None:
+    # A scan's last two millimetres at 60 mm/s ended it: the motion was refused as jerky.
+    with compressed() as made:
+        made.robot.compress(68.0, duration_s=1.0)
+        assert made.robot.probe((0.0, 0.0, 70.0), speed_mm_s=60.0) is None
+        assert made.robot.pose.length_mm == pytest.approx(70.0, abs=0.1)
+
+
 def test_an_unguarded_move_into_something_trips_too() -> None:
     with compressed(obstacle=Obstacle(below_tip_mm=1.0, edge_mm=50.0)) as made:
         robot, stage = made.robot, made.stage
