@@ -175,12 +175,12 @@ WHOLE = (
     ),
     Scope(
         name="epochs", what="segments behind some that are refused",
-        kinds=("segments", "bad_segments"), commands=3, holding=True,
+        kinds=("segments", "bad_segments"), commands=4, holding=True,
     ),
     Scope(name="commands", what="any two commands, from relaxed"),
     Scope(
         name="late", what="records that come late",
-        kinds=("disarm", "bad_segments"), commands=3, holding=True, eras=3, late=True,
+        kinds=("disarm", "bad_segments"), commands=4, holding=True, eras=3, late=True,
     ),
     Scope(
         name="resume", what="segments, a stop, a resume", kinds=("segments", "resume"),
@@ -191,8 +191,8 @@ WHOLE = (
         commands=2, stops=2, holding=True, eras=5,
     ),
     Scope(
-        name="contact", what="a guarded move, and a contact at any moment",
-        kinds=("segments", "guard"), commands=3, trips=1, holding=True, eras=3,
+        name="contact", what="a guarded move, a contact and a stop at any moment",
+        kinds=("segments", "guard"), commands=3, trips=1, stops=1, holding=True,
     ),
     Scope(
         name="trip", what="a guard, a trip at any moment, a resume", kinds=("guard", "resume"),
@@ -204,7 +204,7 @@ WHOLE = (
     ),
     Scope(
         name="switch", what="segments, and the stop switch", kinds=("segments", "resume"),
-        commands=2, switches=1, holding=True,
+        commands=3, switches=1, holding=True,
     ),
     Scope(
         name="handshake", what="a session that opens, and a stop meanwhile",

@@ -9,13 +9,17 @@ import pytest
 
 from setae_protocol.frame import cobs_decode, encode_board, encode_host
 from setae_protocol.messages import (
+    BAUD,
     BOARD_OVERHEAD_BYTES,
+    FRAME_WIRE_BYTES_MAX,
     HOST_OVERHEAD_BYTES,
+    WINDOW_FRAMES,
     Enable,
     Receipt,
     Segment,
     Segments,
     Stop,
+    Telemetry,
 )
 
 README = Path(__file__).resolve().parents[2] / "protocol/README.md"
@@ -93,3 +97,19 @@ def test_overhead() -> None:
     text = README.read_text(encoding="utf-8")
     together = f"**{HOST_OVERHEAD_BYTES}** | **{BOARD_OVERHEAD_BYTES}**"
     assert f"| **together, bytes** | {together} |" in text
+
+
+def test_times_on_the_line() -> None:
+    """They were still those of half the rate."""
+    text = " ".join(README.read_text(encoding="utf-8").split())
+    byte_ms = 10_000 / BAUD
+
+    def ms(count: int) -> str:
+        return f"{count * byte_ms:.1f} ms"
+
+    window = WINDOW_FRAMES * (HOST_OVERHEAD_BYTES + Segments.SIZE)
+    telemetry = BOARD_OVERHEAD_BYTES + Telemetry.SIZE
+    assert f"no message holds up the next for more than {ms(FRAME_WIRE_BYTES_MAX)}" in text
+    assert f"a stop is delayed by {ms(window)} on the line at most" in text
+    assert f"and takes {ms(len(FRAMES['stop']))} itself" in text
+    assert f"telemetry is {telemetry} bytes, {ms(telemetry)} of each 20 ms" in text
