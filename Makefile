@@ -154,7 +154,7 @@ wheel: .venv/.dev ## build sdist and wheel, and run what they install outside th
 	$(BIN)/python .ci/wheel.py
 
 .PHONY: model
-model: .venv/.dev ## check the model of link and states whole, and count its states (minutes)
+model: .venv/.dev ## check the model of link and states whole, and hold it against the host (minutes)
 	@.ci/need $(MODEL_PACKAGES)
 	$(BIN)/python -m tests.model.checker
 	$(BIN)/python -m tests.model.host_walk
