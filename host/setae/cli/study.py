@@ -88,7 +88,7 @@ def study(
     rows = _conduct(plan.runs(), folder, workers, scheduler)
     table = studies.write_table(folder / "table.parquet", rows)
     failed = [row for row in rows if row["status"] != "done"]
-    say(f"{len(rows) - len(failed)} runs are done, {len(failed)} failed.")
+    say(f"{len(rows) - len(failed)} of {len(rows)} runs are done, {len(failed)} failed.")
     for row in failed[:5]:
         say(f"  {row['run']}: {row['error']}")
     if len(failed) > 5:

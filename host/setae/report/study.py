@@ -18,6 +18,7 @@ from setae.report.files import Report
 
 __all__ = ["measures_picture", "runs_picture", "write"]
 
+_LEAST_RANGE_MM = 20.0
 _COLUMNS = 8
 _ROWS = 8
 _MEASURES = (
@@ -159,16 +160,18 @@ def runs_picture(path: Path, done: Sequence[Row], folder: Path) -> Path:
         figure.text(0.2 / width, 1 - 0.15 / height, "Height maps from above", fontsize=15,
                     weight="bold", va="top")  # fmt: skip
         more = f" The first {len(shown)} of {len(done)} runs." if len(shown) < len(done) else ""
-        figure.text(0.2 / width, 1 - 0.5 / height, "Each in its own colours, blue deep and red "
-                    f"high.{more}", fontsize=10, color=palette.MUTED, va="top")  # fmt: skip
+        figure.text(0.2 / width, 1 - 0.5 / height, "Each in its own colours, from its top down."
+                    f"{more}", fontsize=10, color=palette.MUTED, va="top")  # fmt: skip
         grid = figure.add_gridspec(count, columns, left=0.2 / width, right=1 - 0.2 / width,
                                    bottom=0.3 / height, top=1 - 0.8 / height, wspace=0.1,
                                    hspace=0.25)  # fmt: skip
         for index, (row, heights) in enumerate(shown):
             axes = figure.add_subplot(grid[divmod(index, columns)])
             felt = heights.height_mm[np.isfinite(heights.height_mm)]
-            low, high = (felt.min(), felt.max()) if len(felt) else (0.0, 1.0)
-            clouds.draw_map(axes, heights, low_mm=float(low), high_mm=float(high))
+            high_mm = float(felt.max()) if len(felt) else 0.0
+            # Something flat doesn't get all colours.
+            low_mm = min(float(felt.min()) if len(felt) else 0.0, high_mm - _LEAST_RANGE_MM)
+            clouds.draw_map(axes, heights, low_mm=low_mm, high_mm=high_mm)
             name = f"{clouds.title_of(str(row['object']))} {row['seed']}\n{row['mode']}"
             axes.set_xlabel(name, fontsize=7.5)
         style.save(figure, path)
@@ -182,7 +185,9 @@ def _page(rows: Sequence[Row], varied: Sequence[str], drawn: Sequence[Path]) -> 
     failed = [row for row in rows if row["status"] != "done"]
     badges = '<span class="badge">Simulated: no hardware</span>'
     if failed:
-        badges += f'<span class="badge warn">{len(failed)} runs failed; see below</span>'
+        badges += (
+            f'<span class="badge warn">{len(failed)} of {len(rows)} runs failed; see below</span>'
+        )
     words = ("What each measure came to, by object", "Height maps of the runs")
     pictures = [template.image(path, text) for path, text in zip(drawn, words, strict=False)] + [
         "",

@@ -131,14 +131,16 @@ def _distributed(
     distributed = extras.load("distributed", "study", "More than one worker")
     with ExitStack() as stack:
         if scheduler is None:
-            # Nobody else can reach it, and it has no pages.
+            # Only this machine can reach it, it has no pages, and any free ports will do: studies
+            # run beside each other.
             cluster = stack.enter_context(
                 distributed.LocalCluster(
                     n_workers=workers,
                     threads_per_worker=1,
                     processes=True,
                     host="127.0.0.1",
-                    dashboard_address=None,
+                    dashboard_address="127.0.0.1:0",
+                    scheduler_kwargs={"dashboard": False},
                     silence_logs=50,
                 )
             )
