@@ -1,6 +1,6 @@
 """Reports: what a run's logs say, as a web page, pictures and tables.
 
-`write` is the way in. `explore`, `validation` and `bristle` are the reports of the
+`write` is the way in. `explore`, `scan`, `validation` and `bristle` are the reports of the
 experiments, each with its page, pictures and tables; `paper` holds the paper's
 numbers. Of the exploration, `reading` finds a `trial` in a log, `shapes` and
 `drawing` draw the robot, and `scene`, `felt` and `depths` draw its pictures.
@@ -16,11 +16,16 @@ from pathlib import Path
 from setae import record
 from setae.errors import LogError
 from setae.record import Log
-from setae.report import bristle, explore, files, validation
+from setae.report import bristle, explore, files, scan, validation
 
-__all__ = ["bristle", "explore", "validation", "write"]
+__all__ = ["bristle", "explore", "scan", "validation", "write"]
 
-_WRITERS = {"explore": explore.write, "validate": validation.write, "bristle": bristle.write}
+_WRITERS = {
+    "explore": explore.write,
+    "scan": scan.write,
+    "validate": validation.write,
+    "bristle": bristle.write,
+}
 
 
 def write(logs: str | Path | Iterable[str | Path | Log], path: str | Path) -> Path:

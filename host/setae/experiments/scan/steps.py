@@ -253,7 +253,13 @@ class Steps:
             aborted = True
             approach.abort()
 
-        feeling = self._feel(dataclasses.replace(approach, abort=abort), near_mm)
+        def busy() -> bool:
+            moving = approach.busy()
+            if not moving:  # what was grazed on the way is no slip of this place
+                self._watch.begin()
+            return moving
+
+        feeling = self._feel(dataclasses.replace(approach, busy=busy, abort=abort), near_mm)
         if not aborted:
             return feeling
         assert feeling is not None

@@ -1,0 +1,199 @@
+"""Scans as one web page that needs no network."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from setae.heightmap import TOUCHED
+from setae.report import extras, palette, template
+from setae.report.scan_pictures import cloud, top_mm
+from setae.report.scan_reading import Scan
+
+_PICTURES: Final = {
+    "heights": "Height maps from above, with flags, the true surface and the errors",
+    "clouds": "The clouds of points, coloured by their distance from the robot",
+    "paths": "The arm's way from above, coloured by time",
+    "pressure": "Pressure of the bristle over the scan and around the first touch",
+}
+_SIMULATED: Final = (
+    "simulated: the board’s own firmware, compiled for this computer, drives a physical model of "
+    "servos, tendons, spring and bristle. No hardware was involved."
+)
+_SAID: Final = {
+    "paper": "the paper’s cycle",
+    "safe": "retracted in every step",
+    "adaptive": "adaptive",
+}
+
+
+def page(scans: Sequence[Scan], pictures: Sequence[Path]) -> str:
+    """Return the whole page.
+
+    Raises
+    ------
+    ExtraMissingError
+        Plotly isn't installed.
+    """
+    plotly = extras.load("plotly.offline")
+    by_name = {path.stem: path for path in pictures}
+    settings = scans[0].config.scan
+    return template.fill(
+        "scan.html",
+        {
+            "css": template.text("page.css"),
+            "badges": _badges(scans),
+            "step": f"{settings.step_mm:g} mm",
+            "threshold": f"{scans[0].config.bristle.threshold_hpa:g} hPa",
+            "finding": html.escape(finding(scans)),
+            "table": _table(scans),
+            "depth": f"{settings.contact_depth_mm:g} mm",
+            "origin": _origin(scans),
+            "config": template.config_text(scans[0].logs[0].metadata),
+            "plotly": plotly.get_plotlyjs(),
+            "data": template.json_text(_data(scans)),
+            "js": template.text("scan.js"),
+            **{name: template.image(by_name[name], text) for name, text in _PICTURES.items()},
+        },
+    )
+
+
+def finding(scans: Sequence[Scan]) -> str:
+    """Say in a few sentences what came out."""
+    sentences = []
+    for scan in scans:
+        marks = scan.result.height_map.mark
+        touched = int(np.isin(marks, TOUCHED).sum())
+        text = f"{scan.result.mode}: {touched} of {marks.size} places touched"
+        if scan.result.mode == "adaptive":
+            text += f", {int((marks == 'inferred').sum())} inferred"
+        text += f", in {scan.result.duration_s:.0f} s of robot time"
+        if not scan.result.complete:
+            text += ", not complete"
+        sentences.append(f"{text[:1].upper()}{text[1:]}.")
+    times_s = {scan.result.mode: scan.result.duration_s for scan in scans if scan.result.complete}
+    if times_s.get("paper") and "adaptive" in times_s:
+        share = times_s["adaptive"] / times_s["paper"]
+        sentences.append(f"The adaptive scan took {share:.0%} of the time of the paper’s cycle.")
+    return " ".join(sentences)
+
+
+def _badges(scans: Sequence[Scan]) -> str:
+    if scans[0].logs[0].simulated:
+        badges = '<span class="badge">Simulated: no hardware</span>'
+    else:
+        badges = '<span class="badge real">Measured on the robot</span>'
+    if any(not scan.result.complete or log.damage for scan in scans for log in scan.logs):
+        badges += '<span class="badge warn">Not all scans are complete; see below</span>'
+    return badges
+
+
+def _table(scans: Sequence[Scan]) -> str:
+    truth = any(scan.quality for scan in scans)
+    paper = next((scan for scan in scans if scan.result.mode == "paper"), None)
+    head = ["mode", "robot time (s)", "touched", "inferred", "empty", "slipped / double / lost"]
+    if truth:
+        head += ["error (mm)", "at edges (mm)"]
+    if paper is not None and len(scans) > 1:
+        head.append("like the paper’s")
+    lines = ["<table><thead><tr>", *(f"<th>{name}</th>" for name in head), "</tr></thead><tbody>"]
+    for scan in scans:
+        marks = scan.result.height_map.mark
+        inferred, empty, *flagged = (
+            str(int((marks == name).sum()))
+            for name in ("inferred", "empty", "slipped", "double", "lost")
+        )
+        cells = [
+            html.escape(_SAID[scan.result.mode])
+            + ("" if scan.result.complete else " <br><small>(not complete)</small>"),
+            f"<b>{scan.result.duration_s:.0f}</b>",
+            str(int(np.isin(marks, TOUCHED).sum())),
+            inferred,
+            empty,
+            " / ".join(flagged),
+        ]
+        if truth:
+            found = scan.quality
+            cells += (
+                [f"{found.rms_mm:.2f} ({found.places})", f"{found.edge_rms_mm:.1f}"]
+                if found
+                else ["–", "–"]
+            )
+        if paper is not None and len(scans) > 1:
+            cells.append("–" if scan is paper else f"{_agreement(scan, paper):.1%}")
+        lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+    return "".join([*lines, "</tbody></table>"])
+
+
+def _agreement(scan: Scan, paper: Scan) -> float:
+    """Share of places where both found something, or both nothing."""
+    ours, theirs = (np.isfinite(one.result.height_map.height_mm) for one in (scan, paper))
+    return float((ours == theirs).mean()) if ours.shape == theirs.shape else float("nan")
+
+
+def _origin(scans: Sequence[Scan]) -> str:
+    first = scans[0].logs[0]
+    rows: list[tuple[str, str]] = []
+    if first.simulated:
+        rows.append(("robot", _SIMULATED))
+        rows.append(("plant, seed", f"{first.metadata.get('plant')}, {first.metadata.get('seed')}"))
+    else:
+        rows.append(("robot", "the real one"))
+    what = scans[0].result.scene.get("object")
+    if isinstance(what, Mapping):
+        place = f"at {what['x_mm']:g}, {what['y_mm']:g} mm, turned by {what['yaw_deg']:g}°"
+        rows.append(("object", f"{what['shape']}, size {what['scale']:g}, {place}"))
+    versions = first.metadata.get("versions") or {}
+    if isinstance(versions, Mapping) and versions:
+        rows.append(("versions", ", ".join(f"{name} {v}" for name, v in sorted(versions.items()))))
+    rows.append(("logs", ", ".join(log.path.name for scan in scans for log in scan.logs)))
+    for scan in scans:
+        if scan.problem:
+            rows.append((scan.result.mode, f"not complete: {scan.problem}"))
+        rows += [(log.path.name, str(log.damage)) for log in scan.logs if log.damage]
+    items = "".join(f"<dt>{html.escape(a)}</dt><dd>{html.escape(b)}</dd>" for a, b in rows)
+    return f"<dl>{items}</dl>"
+
+
+def _data(scans: Sequence[Scan]) -> dict[str, Any]:
+    return {
+        "scans": [_scan(scan) for scan in scans],
+        "colours": {
+            "ink": palette.INK,
+            "grid": palette.GRID,
+            "contact": palette.CONTACT,
+            "heat": [
+                [index / (len(palette.HEAT) - 1), colour]
+                for index, colour in enumerate(reversed(palette.HEAT))
+            ],
+        },
+    }
+
+
+def _scan(scan: Scan) -> dict[str, Any]:
+    points, inferred = cloud(scan)
+    grid = scan.result.height_map
+    surface = scan.surface
+    true_mm = None
+    if surface is not None:
+        true_mm = np.where(
+            surface.height_mm > scan.lowest_mm, surface.height_mm - scan.base_mm, np.nan
+        )
+    return {
+        "mode": scan.result.mode,
+        "points": [[float(value) for value in point] for point in points],
+        "inferred": [bool(one) for one in inferred],
+        "above": scan.above,
+        "range_mm": [scan.lowest_mm - scan.base_mm, top_mm(scan)],
+        "size_mm": [float(places[-1]) for places in (grid.x_mm, grid.y_mm)],
+        "truth": None
+        if true_mm is None or surface is None
+        else {
+            "step_mm": surface.step_mm,
+            "height_mm": [[float(value) for value in row] for row in true_mm],
+        },
+    }
