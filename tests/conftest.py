@@ -16,6 +16,8 @@ settings.load_profile("setae")
 
 ROOT = Path(__file__).resolve().parents[1]
 NATIVE_FOLDERS = ("firmware/lib", "simulator")
+# Where files are handed out to several cores, none has to wait for a long one at the end.
+LONG_FIRST = ("system", "ur", "fuzz", "avr", "model")
 
 
 def newer_than(stamp: Path) -> list[Path]:
@@ -30,6 +32,16 @@ def newer_than(stamp: Path) -> list[Path]:
 def gone(listing: Path) -> list[str]:
     """Return the modules that the editable installation looks for in vain."""
     return [name for name in listing.read_text().split() if not (ROOT / name).exists()]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Bring the folders with the longest tests first; all else keeps its order."""
+
+    def place(item: pytest.Item) -> int:
+        folder = item.path.parent.name
+        return LONG_FIRST.index(folder) if folder in LONG_FIRST else len(LONG_FIRST)
+
+    items.sort(key=place)
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
