@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
@@ -174,6 +175,21 @@ def test_a_broken_block_costs_only_itself(tmp_path: Path) -> None:
     times_us = log.times_us("/telemetry")
     assert len(times_us) >= 400 - 55
     assert times_us[-1] == 399 * 20_000
+
+
+def test_a_size_beyond_any_memory_costs_only_its_block(tmp_path: Path) -> None:
+    """A block that said to unpack to 2^63 bytes and more ended in an OverflowError."""
+    path = write_seconds(tmp_path / "run.mcap", 8.0)
+    data = bytearray(path.read_bytes())
+    offset = 8  # behind the magic; a record is a code, its size in 8 bytes, and its body
+    while data[offset] != Opcode.CHUNK:
+        offset += 9 + int.from_bytes(data[offset + 1 : offset + 9], "little")
+    data[offset + 25 : offset + 33] = b"\xff" * 8  # behind the times of its start and end
+    path.write_bytes(bytes(data))
+    log = read(path)
+    assert log.damage is not None
+    assert log.damage.chunks_lost == 1
+    assert log.times_us("/telemetry")[-1] == 399 * 20_000
 
 
 def test_no_damage_makes_reading_fail_unclearly(tmp_path: Path) -> None:

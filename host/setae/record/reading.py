@@ -140,6 +140,7 @@ _BROKEN = (
     ValueError,  # a wrong CRC, JSON or UTF-8
     LookupError,
     MemoryError,  # a broken size
+    OverflowError,  # one beyond any memory
     RecursionError,  # JSON that is nested too deep
     struct.error,
     zstandard.ZstdError,
