@@ -152,7 +152,8 @@ void Lps33hw::sample(Cycle when) {
   if (silent_)
     return;
   // The part's noise is many times the last bit, so that no value stays for long.
-  const int32_t raw = raw_ ^ (samples_.size() % 8 == 7);
+  const int32_t raw = raw_ == last_raw_ ? raw_ ^ 1 : raw_;
+  last_raw_ = raw;
   samples_.push_back({when, raw});
   if (locked_) {  // BDU: not updated until both parts have been read
     held_back_ = true;

@@ -72,6 +72,7 @@ class Lps33hw {
   double due_ = 0;
 
   int32_t raw_ = 0;
+  int32_t last_raw_ = 0;
   std::vector<PressureSample> pending_;  // pressures to come, in order
   std::vector<PressureSample> samples_;
 };

@@ -73,6 +73,7 @@ void Twi::start(uint8_t address, uint8_t reg, uint8_t size, bool reading) {
   prepare(address, reg, size, reading);
   begun_ = false;
   told_ = false;
+  seen_ = false;  // a sensor that is set up anew may show another value without having measured
   result_ = Result::kBusy;
   begun_ticks_ = servo_pulses::ticks();
   begin_transfer();
@@ -116,8 +117,9 @@ bool Twi::again() {
   if (tries_ == 0)
     return false;
   // A sample that comes between the status and the value is told by the value alone.
-  if ((data_[0] & bits_) != 0 || data_[1] != last_[0] || data_[2] != last_[1] ||
-      data_[3] != last_[2]) {
+  const bool changed = data_[1] != last_[0] || data_[2] != last_[1] || data_[3] != last_[2];
+  if ((data_[0] & bits_) != 0 || (changed && seen_)) {
+    seen_ = true;
     last_[0] = data_[1];
     last_[1] = data_[2];
     last_[2] = data_[3];

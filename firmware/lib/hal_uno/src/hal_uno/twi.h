@@ -70,6 +70,7 @@ class Twi {
   volatile Result result_ = Result::kIdle;
   uint8_t data_[kReadMax] = {};
   uint8_t last_[kReadMax - 1] = {};
+  bool seen_ = false;  // last_ is a sample
 };
 
 }  // namespace setae
