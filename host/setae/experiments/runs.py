@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from setae import kinematics, workspace
-from setae.config import Config, loads
-from setae.errors import ConfigError, LogError
+from setae.config import Config
+from setae.errors import LogError
 from setae.experiments.accuracy import Pose
 from setae.experiments.targets import Target, find, paper_targets
 from setae.record import Log
@@ -118,7 +118,7 @@ def read(logs: Iterable[Log]) -> tuple[Run, ...]:
 
 
 def _run(model: str, logs: Sequence[Log]) -> Run:
-    config = _config(logs[0])
+    config = logs[0].config
     targets = paper_targets(config)
     found: dict[str, Pose | None] = {}
     cut_mm: dict[str, float] = {}
@@ -146,10 +146,3 @@ def _run(model: str, logs: Sequence[Log]) -> Run:
         config=config,
         logs=tuple(logs),
     )
-
-
-def _config(log: Log) -> Config:
-    try:
-        return loads(str(log.metadata.get("config", "")), source=str(log.path))
-    except ConfigError:
-        return loads("")

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from setae import record
-from setae.config import Config, load, loads
-from setae.errors import ConfigError, InputError, LogError, SetaeError
+from setae.config import Config, load
+from setae.errors import InputError, LogError, SetaeError
 from setae.experiments import scan
 from setae.experiments.study.conducting import RUNS
 from setae.experiments.study.one import MAP
@@ -149,10 +149,7 @@ def _of_logs(path: Path) -> list[Sample]:
 def _of_parts(logs: Sequence[Log], name: str) -> Sample:
     result = scan.read_parts(logs)
     scene = _scene(result.scene) if logs[0].simulated else None
-    try:
-        config = loads(str(logs[0].metadata.get("config", "")), source=str(logs[0].path))
-    except ConfigError as error:
-        raise LogError(f"The configuration in {logs[0].path} can't be used.", str(error)) from error
+    config = logs[0].config
     origin = "measured on the robot"
     if logs[0].simulated:
         origin = f"simulated, plant {config.plant}, mode {result.mode}"

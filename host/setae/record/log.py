@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from setae.errors import InputError
+from setae.config import Config, loads
+from setae.errors import ConfigError, InputError, LogError
 from setae.record.topics import TOPICS
 
 
@@ -88,6 +89,23 @@ class Log:
     def simulated(self) -> bool:
         """Whether the robot was simulated, as far as the log says."""
         return bool(self.metadata.get("simulated", "/truth" in self._messages))
+
+    @property
+    def config(self) -> Config:
+        """The run's configuration; the paper's robot where the log has none.
+
+        Raises
+        ------
+        LogError
+            This version can't read it.
+        """
+        try:
+            return loads(str(self.metadata.get("config", "")), source=str(self.path))
+        except ConfigError as error:
+            raise LogError(
+                f"The configuration in {self.path} can't be used. {error.problem}",
+                "Read the log with the version of setae that wrote it.",
+            ) from error
 
     @property
     def span_us(self) -> tuple[int, int]:

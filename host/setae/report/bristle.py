@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from setae.config import Config, loads
-from setae.errors import ConfigError, LogError
+from setae.errors import LogError
 from setae.experiments.bristle import EXPERIMENT, Move, Threshold, moves_in, rates, threshold
 from setae.record import Log, read
 from setae.report import files, palette, style, template
@@ -84,13 +83,6 @@ def finding(moves: Sequence[Move], configured_hpa: float) -> str:
     )
 
 
-def _config(log: Log) -> Config:
-    try:
-        return loads(str(log.metadata.get("config", "")))
-    except ConfigError:
-        return loads("")
-
-
 def _note(log: Log) -> str:
     if not log.simulated:
         return "Measured on the robot."
@@ -103,7 +95,7 @@ def _note(log: Log) -> str:
 def picture(path: Path, log: Log) -> Path:
     """Draw histograms, rates over the threshold, and what the peaks depend on."""
     moves = moves_in(log)
-    chosen, configured = threshold(moves), _config(log).bristle.threshold_hpa
+    chosen, configured = threshold(moves), log.config.bristle.threshold_hpa
     free = np.array([move.peak_hpa for move in moves if not move.touched])
     touches = np.array([move.peak_hpa for move in moves if move.touched])
     most = 1.08 * max(float(touches.max()), configured, float(free.max()))
@@ -177,7 +169,7 @@ def _against(axes: Any, moves: Sequence[Move], label: str, title: str, *, touche
 
 
 def _page(log: Log, moves: Sequence[Move], drawn: Path) -> str:
-    config = _config(log)
+    config = log.config
     chosen = threshold(moves)
     badge = (
         f'<span class="badge">{html.escape(_note(log).rstrip("."))}: no hardware</span>'

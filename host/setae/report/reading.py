@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from setae import kinematics
 from setae.arc import Arc
-from setae.config import Config, loads
-from setae.errors import ConfigError, InputError, LogError
+from setae.config import Config
+from setae.errors import InputError, LogError
 from setae.record import Log
 from setae.report.trial import (
     Contact,
@@ -61,7 +61,7 @@ def load(log: Log, *, number: int = 1) -> Trial:
     lowering_contact = _lowering_contact(log)
     deepest_mm = max((level.descent_mm for level in levels), default=0.0)
     scene = log.metadata.get("scene") or {}
-    config = _config(log)
+    config = log.config
     trial = Trial(
         number=int(log.metadata.get("trial") or number),
         obstacle_below_tip_mm=_obstacle_below_tip_mm({**log.metadata, **start.data}),
@@ -273,14 +273,6 @@ def _arm_path(log: Log, times_us: NDArray[np.int64]) -> Floats:
         return np.zeros((len(times_us), 3))
     position = log.array("/stage", "position_mm")
     return np.stack([np.interp(times_us, known_us, axis) for axis in position.T], axis=1)
-
-
-def _config(log: Log) -> Config:
-    """Return the run's configuration; the default where the log has none that fits."""
-    try:
-        return loads(str(log.metadata.get("config", "")), source=str(log.path))
-    except ConfigError:
-        return loads("")
 
 
 def _pressure(log: Log) -> Pressure:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from setae import record
-from setae.config import Scan, loads
-from setae.errors import ConfigError, LogError
+from setae.config import Scan
+from setae.errors import LogError
 from setae.experiments.scan.run import MODES, Mode, ScanResult
 from setae.experiments.scan.survey import Place, Survey
 from setae.record import Log
@@ -110,7 +110,4 @@ def settings_of(log: Log) -> Scan:
     LogError
         The log's configuration can't be read.
     """
-    try:
-        return loads(str(log.metadata.get("config", "")), source=str(log.path)).scan
-    except ConfigError as error:
-        raise LogError(f"The configuration in {log.path} can't be used.", str(error)) from error
+    return log.config.scan
