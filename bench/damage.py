@@ -57,7 +57,7 @@ def fuzzing() -> Iterable[Figure]:
         found - mended,
         "inputs",
         "of all those: on which the code under test crashed or broke a promise, and still does;"
-        f" {found} were found, {mended} of them mended; at {alarms} more an observer was wrong"
+        f" {found} found, {mended} of them mended; at {alarms} more an observer was wrong"
         + "".join(f" ({note})" for note in notes),
     )
 
