@@ -16,7 +16,6 @@ from setae.errors import InputError
 from setae.experiments import bristle as study
 from setae.experiments.events import Event
 from setae.record import Recorder
-from setae.report.files import writing
 from setae.scene import open_scene
 from setae.stage import Enter
 
@@ -134,6 +133,8 @@ def _measure(
             f"{name}: {one.hpa:g} hPa. {one.false} of {one.free} moves without contact count as "
             f"touches, {one.missed} of {one.touches} touches are missed."
         )
+    from setae.report.files import writing
+
     fragment = folder / "bristle.toml"
     with writing(folder, "The threshold"):
         fragment.write_text(_toml(chosen, simulated=where.simulated), encoding="utf-8")
