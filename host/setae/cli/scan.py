@@ -211,9 +211,13 @@ def _scene(config: Config, path: Path) -> TableScene:
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"The scene {path} can't be read: {error.strerror}.") from error
+        raise InputError(
+            f"The scene {path} can't be read: {error.strerror}.", "Check the file's name."
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"The scene {path} isn't valid TOML: {error}.") from None
+        raise InputError(
+            f"The scene {path} isn't valid TOML: {error}.", "Correct that line."
+        ) from None
     if "table_z_mm" not in data:
         data["table_z_mm"] = table_scene(config).table_z_mm
     found = of_description(data)

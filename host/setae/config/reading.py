@@ -132,7 +132,7 @@ def _parse(text: str, source: str) -> dict[str, dict[str, Any]]:
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{source} isn't valid TOML: {error}.") from None
+        raise ConfigError(f"{source} isn't valid TOML: {error}.", "Correct that line.") from None
     return _parse_document(document, source)
 
 

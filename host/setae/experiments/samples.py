@@ -204,7 +204,9 @@ def _of_run(folder: Path) -> Sample:
             scene = TableScene(table_z_mm=row["table_z_mm"], object=what)
         reach_mm = float(row["reach_mm"])
     except (KeyError, TypeError, ValueError, SetaeError) as error:
-        raise InputError(f"{folder} holds no run of this version: {error}.") from error
+        raise InputError(
+            f"{folder} holds no run of this version: {error}.", "Run the study again."
+        ) from error
     plant = row.get("simulator.plant_name") or "ideal"
     return Sample(
         name=folder.name,

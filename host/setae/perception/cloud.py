@@ -109,7 +109,9 @@ def read(path: str | Path) -> PointCloud:
     try:
         return reader(path)
     except OSError as error:
-        raise InputError(f"{path} can't be read: {error.strerror or error}.") from error
+        raise InputError(
+            f"{path} can't be read: {error.strerror or error}.", "Check the file's name."
+        ) from error
     except (ValueError, KeyError, IndexError, EOFError) as error:
         raise InputError(
             f"{path} holds no point cloud: {error}.", "Give a file that `setae cloud` wrote."

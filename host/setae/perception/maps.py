@@ -31,7 +31,10 @@ def write(path: str | Path, heights: HeightMap) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(as_bytes(heights))
     except OSError as error:
-        raise InputError(f"{path} can't be written: {error.strerror or error}.") from error
+        raise InputError(
+            f"{path} can't be written: {error.strerror or error}.",
+            "Check the folder and the room on the disk.",
+        ) from error
     return path
 
 
@@ -54,9 +57,13 @@ def read(path: str | Path) -> HeightMap:
         with np.load(path, allow_pickle=False) as file:
             return HeightMap(**{name: file[name] for name in _FIELDS})
     except OSError as error:
-        raise InputError(f"{path} can't be read: {error.strerror or error}.") from error
+        raise InputError(
+            f"{path} can't be read: {error.strerror or error}.", "Check the file's name."
+        ) from error
     except (ValueError, KeyError, EOFError, TypeError, AttributeError) as error:
-        raise InputError(f"{path} holds no height map: {error}.") from error
+        raise InputError(
+            f"{path} holds no height map: {error}.", "Give a file that `setae cloud` wrote."
+        ) from error
 
 
 def known(heights: HeightMap) -> FloatArray:

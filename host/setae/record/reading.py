@@ -53,7 +53,10 @@ def read(path: str | Path) -> Log:
     reading = _Reading(data)
     reading.run()
     if not reading.profile_seen:
-        raise LogError(f"{path} is an MCAP file, but not a log of setae.")
+        raise LogError(
+            f"{path} is an MCAP file, but not a log of setae.",
+            "Give a file that an experiment wrote.",
+        )
     return Log(path, reading.metadata, reading.messages, reading.damage())
 
 

@@ -126,7 +126,7 @@ class Recorder:
     def _add(self, topic: str, time_us: int, data: Mapping[str, Any]) -> None:
         """Add a message whose fields are the topic's and which `encode` takes as they are."""
         if self._file is None:
-            raise LogError(f"{self.path} is closed already.")
+            raise LogError(f"{self.path} is closed already.", "Make another recorder.")
         time_us = int(time_us)
         payload = encode({"time_us": time_us, **data})
         with self._errors:

@@ -335,7 +335,9 @@ class Rig:
             For an experiment's own events.
         """
         if self._log is not None:
-            raise LogError(f"{self._log.recorder.path} is being written already.")
+            raise LogError(
+                f"{self._log.recorder.path} is being written already.", "A rig has one log."
+            )
         about = {**self._metadata(), **(metadata or {})}
         self._log = RigLog(self.robot, self.stage, self.world, Recorder(path, metadata=about))
         return self._log.recorder

@@ -82,7 +82,10 @@ def read_parts(parts: Sequence[Log]) -> ScanResult:
         raise LogError(f"{parts[0].path} holds no scan.", "Give the log of a run of `setae scan`.")
     mode: Any = starts[0][0].data["mode"]
     if mode not in MODES:
-        raise LogError(f"{parts[0].path} holds a scan of unknown mode {mode!r}.")
+        raise LogError(
+            f"{parts[0].path} holds a scan of unknown mode {mode!r}.",
+            "Read the log with the version of setae that wrote it.",
+        )
     survey = Survey(settings_of(parts[0]))
     places: list[Place] = []
     # Of a single later part: what the others took.

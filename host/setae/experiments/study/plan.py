@@ -152,9 +152,11 @@ def load(path: Path, *, keep_logs: bool = False) -> Plan:
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"{path} can't be read: {error.strerror or error}.") from error
+        raise InputError(
+            f"{path} can't be read: {error.strerror or error}.", "Check the file's name."
+        ) from error
     except ValueError as error:
-        raise InputError(f"{path} isn't valid TOML: {error}.") from error
+        raise InputError(f"{path} isn't valid TOML: {error}.", "Correct that line.") from error
     known = {"study": ("objects", "seeds", "modes", "plants", "config"), "vary": None}
     for section, table in document.items():
         if section not in known or not isinstance(table, dict):

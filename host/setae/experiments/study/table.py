@@ -31,7 +31,9 @@ def write_table(path: Path, rows: Sequence[Row]) -> Path:
     try:
         parquet.write_table(arrow.table(columns), path)
     except OSError as error:
-        raise InputError(f"{path} can't be written: {error}.") from error
+        raise InputError(
+            f"{path} can't be written: {error}.", "Check the folder and the room on the disk."
+        ) from error
     return path
 
 
@@ -49,7 +51,9 @@ def read_table(path: Path) -> list[dict[str, Any]]:
     try:
         rows: list[dict[str, Any]] = parquet.read_table(path).to_pylist()
     except (OSError, ValueError) as error:
-        raise InputError(f"{path} is no table of a study: {error}.") from error
+        raise InputError(
+            f"{path} is no table of a study: {error}.", "Give one that `setae study` wrote."
+        ) from error
     return rows
 
 
