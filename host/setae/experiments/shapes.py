@@ -10,6 +10,7 @@ import numpy as np
 from setae.arc import FloatArray
 from setae.errors import InputError
 from setae.experiments.samples import Sample
+from setae.objects import SHAPES
 from setae.perception import classifier, features, paper
 from setae.perception.classifier import Answer, Model
 from setae.perception.measures import Nearness, nearness
@@ -24,7 +25,7 @@ class Comparison:
     Attributes
     ----------
     samples
-        The scans, by label, n of them.
+        The scans, by label, the paper's objects first; n of them.
     labels
         What was scanned, (n,).
     vectors
@@ -98,7 +99,11 @@ def compare(samples: Sequence[Sample]) -> Comparison:
             raise InputError(
                 f"Nobody knows what {sample.name} is a scan of.", "Give it as NAME=PATH."
             )
-    samples = sorted(samples, key=lambda sample: str(sample.label))
+    # The paper's objects in its order, then all others.
+    order = {shape: number for number, shape in enumerate(SHAPES)}
+    samples = sorted(
+        samples, key=lambda one: (order.get(str(one.label), len(order)), str(one.label))
+    )
     labels = [str(sample.label) for sample in samples]
     if len(set(labels)) < 2:
         raise InputError(
