@@ -120,8 +120,8 @@ def study_speedup() -> Iterable[Figure]:
         "study_speedup_2_cores",
         round(statistics.median(ratios), 2),
         "1",
-        f"wall time of {SPEED_RUNS} scans of an eraser, {SPEED_MODE}, in one process over that of two,"
-        f" their start included; one thread each, median of 3, {cores} cores",
+        f"wall time of {SPEED_RUNS} scans of an eraser, {SPEED_MODE}, in one process over that of"
+        f" two, their start included; one thread each, median of 3, {cores} cores",
     )
 
 
