@@ -18,6 +18,7 @@ from setae.cli import (
     experiment,
     firmware,
     logs,
+    look,
     robot,
     scan,
     shapes,
@@ -32,6 +33,7 @@ __all__ = ["app", "main"]
 
 # Each adds its commands when it is imported.
 _COMMANDS = (
+    look,
     robot,
     experiment,
     scan,

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
 from setae import rig
-from setae.cli.common import Where, Whole, app, console, interrupts, new_folder
+from setae.cli.common import Flag, Where, Whole, app, console, interrupts, new_folder
 from setae.cli.runs import ended_early, make_way, say, write_report
 from setae.config import Config
 from setae.errors import InputError
@@ -18,8 +17,6 @@ from setae.experiments.events import Event
 from setae.record import Recorder
 from setae.scene import open_scene
 from setae.stage import Enter
-
-Flag = Annotated[bool, Parameter(negative="")]
 
 # Below the surface's height, so that the robot can be enabled and relaxed at its free length.
 _RAISED_MM = 30.0

@@ -15,8 +15,10 @@ from cyclopts import App, Parameter, Token
 from rich.console import Console
 
 import setae
+from setae import rig
 from setae.config import Config, load
 from setae.errors import InputError, SetaeError
+from setae.robot import Robot
 
 app = App(
     name="setae",
@@ -26,6 +28,9 @@ app = App(
 )
 
 console = Console(highlight=False)
+
+
+Flag = Annotated[bool, Parameter(negative="")]
 
 
 def _whole(kind: object, tokens: Sequence[Token]) -> int:
@@ -170,3 +175,20 @@ class Interrupts:
 
 
 interrupts = Interrupts()
+
+
+@contextmanager
+def connected(where: Where | None, *, leave: rig.Leave) -> Iterator[Robot]:
+    """Connect for one command, with Ctrl-C noticed; `leave` as in `setae.rig.connect`."""
+    where = where or Where()
+    with (
+        interrupts.caught(),
+        rig.connect(
+            where.url,
+            config=where.load(),
+            seed=where.seed,
+            leave=leave,
+            pollables=[interrupts],
+        ) as robot,
+    ):
+        yield robot

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from setae import rig
 from setae.cli.arm import show_arm_targets
-from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.common import Flag, Where, app, console, interrupts, new_folder
 from setae.cli.runs import ended_early, make_way, say, what_is_left, write_report
 from setae.config import Config
 from setae.errors import InputError
@@ -30,8 +30,6 @@ from setae.experiments.explore import ExploreResult, run_trials
 from setae.robot import Robot
 from setae.scene import Obstacle, tube_scene
 from setae.stage import Enter, ManualStage
-
-Flag = Annotated[bool, Parameter(negative="")]
 
 
 @app.command

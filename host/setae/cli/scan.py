@@ -18,7 +18,7 @@ from rich.table import Table
 
 from setae import record, rig
 from setae.cli.arm import show_arm_targets
-from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.common import Flag, Where, app, console, interrupts, new_folder
 from setae.cli.live_map import LiveMap
 from setae.cli.runs import ended_early, make_way, say, what_is_left, write_report
 from setae.config import Config, loads
@@ -30,8 +30,6 @@ from setae.objects import TableScene, UnknownScene, of_description, random_objec
 from setae.robot import Robot
 from setae.stage import Enter, ManualStage
 from setae.ur import UrStage
-
-Flag = Annotated[bool, Parameter(negative="")]
 
 # A person moves the arm by hand between two places, or brings it to the first.
 _MANUAL_TIMEOUT_S = 3600.0

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from setae.arc import FloatArray
-from setae.cli.common import app, console, new_folder
+from setae.cli.common import Flag, app, console, new_folder
 from setae.cli.runs import say
 from setae.errors import ExtraMissingError, InputError
 from setae.experiments import samples, shapes
@@ -17,7 +17,6 @@ from setae.experiments.samples import Sample
 from setae.perception import classifier, features, maps
 from setae.perception import cloud as clouds
 
-Flag = Annotated[bool, Parameter(negative="")]
 Format = Literal["ply", "csv", "npy", "npz", "map"]
 
 

@@ -9,12 +9,11 @@ from typing import Annotated
 from cyclopts import Parameter
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from setae.cli.common import app, console, new_folder
+from setae.cli.common import Flag, app, console, new_folder
 from setae.cli.runs import say
 from setae.errors import ExtraMissingError, InputError, SetaeError
 from setae.experiments import study as studies
 
-Flag = Annotated[bool, Parameter(negative="")]
 Several = Annotated[list[str] | None, Parameter(negative="")]
 
 

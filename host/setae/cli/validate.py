@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from setae import record, rig, tendons
 from setae.arc import FloatArray
-from setae.cli.common import Where, Whole, app, console, interrupts, new_folder
+from setae.cli.common import Flag, Where, Whole, app, console, interrupts, new_folder
 from setae.cli.errors_table import print_causes, print_runs, print_targets
 from setae.cli.runs import ended_early, later, make_way, say, what_is_left, write_report
 from setae.config import Config
@@ -27,7 +27,6 @@ from setae.robot import Robot
 from setae.scene import open_scene
 from setae.stage import Enter
 
-Flag = Annotated[bool, Parameter(negative="")]
 Several = Annotated[list[str] | None, Parameter(negative="")]
 
 # Somebody takes a picture of each pose.

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
 from rich.table import Table
 
 from setae import tendons, volume
-from setae.cli.common import app, console, new_folder
+from setae.cli.common import Flag, app, console, new_folder
 from setae.cli.runs import say
 from setae.config import load
 from setae.volume import Fate, Volumes
-
-Flag = Annotated[bool, Parameter(negative="")]
 
 
 @app.command
