@@ -44,8 +44,10 @@ void Bristle::step(double duration_s, const Vec3& root_mm, const Mat3& axes,
                 settings_.motion_lateral_hpa_s2_per_mm * lateral;
 
   // Standard linear solid: stiff at once, softer in time.
-  const double touch_hpa = settings_.pressure_hpa_per_n * filament_.push_n() +
-                           settings_.pressure_hpa_per_n_mm * filament_.moment_n_mm();
+  const double pressed_hpa = settings_.pressure_hpa_per_n * filament_.push_n() +
+                             settings_.pressure_hpa_per_n_mm * filament_.moment_n_mm();
+  const double most_hpa = settings_.pressure_saturation_hpa;
+  const double touch_hpa = most_hpa * (1 - std::exp(-pressed_hpa / most_hpa));
   relaxed_hpa_ +=
       (touch_hpa - relaxed_hpa_) * (1 - std::exp(-duration_s / settings_.relaxation_time_s));
   contact_hpa_ = touch_hpa - settings_.relaxation_fraction * relaxed_hpa_;

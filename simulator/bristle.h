@@ -13,7 +13,8 @@ struct BristleSettings {
   FilamentSettings filament;
   double pressure_hpa_per_n;     // by what pushes the filament into the gel
   double pressure_hpa_per_n_mm;  // by what turns it in there
-  double relaxation_fraction;    // of a held contact's pressure, lost in time
+  double pressure_saturation_hpa;
+  double relaxation_fraction;  // of a held contact's pressure, lost in time
   double relaxation_time_s;
   double motion_axial_hpa_s2_per_mm;
   double motion_lateral_hpa_s2_per_mm;

@@ -8,27 +8,15 @@ using setae::sim::guarded;
 using setae::sim::kBadArgument;
 using setae::sim::kNotStarted;
 using setae::sim::kWrongTime;
-using setae::sim::Mat3;
 using setae::sim::Plant;
 using setae::sim::Shape;
 using setae::sim::Top;
 using setae::sim::Truth;
 using setae::sim::Vec3;
 using setae::sim::World;
+using setae::sim::write;
 
 namespace {
-
-void write(const Vec3& from, double* out) {
-  out[0] = from.x;
-  out[1] = from.y;
-  out[2] = from.z;
-}
-
-void write(const Mat3& from, double* out) {  // row major
-  const double rows[9] = {from.ex.x, from.ey.x, from.ez.x, from.ex.y, from.ey.y,
-                          from.ez.y, from.ex.z, from.ey.z, from.ez.z};
-  std::memcpy(out, rows, sizeof rows);
-}
 
 // The centre line of a plant that tells its top only: the cubic from D to U with
 // the directions of both ends. For pictures.

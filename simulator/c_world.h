@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <string>
@@ -62,6 +63,18 @@ inline bool read(const double* from, Vec3& out) {
 
 inline bool positive(double value) {
   return std::isfinite(value) && value > 0;
+}
+
+inline void write(const Vec3& from, double* out) {
+  out[0] = from.x;
+  out[1] = from.y;
+  out[2] = from.z;
+}
+
+inline void write(const Mat3& from, double* out) {  // row major
+  const double rows[9] = {from.ex.x, from.ey.x, from.ez.x, from.ex.y, from.ey.y,
+                          from.ez.y, from.ex.z, from.ey.z, from.ez.z};
+  std::memcpy(out, rows, sizeof rows);
 }
 
 constexpr const char* kNotStarted = "the world has not been started";

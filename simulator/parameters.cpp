@@ -87,17 +87,19 @@ const Entry kEntries[] = {
     SETAE_ONE(bristle, tip_offset_mm, 65, 0, 300),
     SETAE_ONE(bristle, filament_length_mm, 53, 1, 300),
     // A nylon line, not quite straight: at rest its middle is off the axis, towards the angle.
-    SETAE_ONE(bristle, filament_diameter_mm, 0.8, 0.1, 5),
+    SETAE_ONE(bristle, filament_diameter_mm, 1, 0.1, 5),
     SETAE_ONE(bristle, filament_modulus_n_per_mm2, 2500, 10, 250000),
     SETAE_ONE(bristle, filament_bow_mm, 0.5, 0, 10),
     SETAE_ONE(bristle, filament_bow_angle_deg, 0, -360, 360),
     // What it is bonded into, far softer: along the filament, and against its root's turning.
     SETAE_ONE(bristle, gel_stiffness_n_per_mm, 0.08, 0.001, 10),
-    SETAE_ONE(bristle, gel_rotation_n_mm_per_rad, 5, 0.05, 10000),
+    SETAE_ONE(bristle, gel_rotation_n_mm_per_rad, 8, 0.05, 10000),
     SETAE_ONE(bristle, friction, 0.4, 0, 2),
     // 150 hPa per N are those of a disc of 9 mm; a turn presses on one half of it.
     SETAE_ONE(bristle, pressure_hpa_per_n, 150, 0, 10000),
-    SETAE_ONE(bristle, pressure_hpa_per_n_mm, 80, 0, 10000),
+    SETAE_ONE(bristle, pressure_hpa_per_n_mm, 100, 0, 10000),
+    // It is never reached: the gel gives way to the sides.
+    SETAE_ONE(bristle, pressure_saturation_hpa, 150, 1, 240),
     SETAE_ONE(bristle, relaxation_fraction, 0.15, 0, 0.95),
     SETAE_ONE(bristle, relaxation_time_s, 0.5, 0.01, 100),
     SETAE_ONE(bristle, motion_axial_hpa_s2_per_mm, 0.007, 0, 1),

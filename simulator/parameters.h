@@ -28,7 +28,8 @@ struct Parameters {
     double filament_diameter_mm, filament_modulus_n_per_mm2, filament_bow_mm,
         filament_bow_angle_deg;
     double gel_stiffness_n_per_mm, gel_rotation_n_mm_per_rad, friction;
-    double pressure_hpa_per_n, pressure_hpa_per_n_mm, relaxation_fraction, relaxation_time_s;
+    double pressure_hpa_per_n, pressure_hpa_per_n_mm, pressure_saturation_hpa;
+    double relaxation_fraction, relaxation_time_s;
     double motion_axial_hpa_s2_per_mm, motion_lateral_hpa_s2_per_mm;
     double natural_frequency_hz, damping_ratio;
   } bristle;

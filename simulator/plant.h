@@ -11,7 +11,8 @@
 namespace setae {
 namespace sim {
 
-constexpr int kTendons = 4;
+constexpr int kTendonsMost = 8;
+using PerTendon = std::array<double, kTendonsMost>;  // what is beyond their number is 0
 
 struct PlantSettings {
   double free_length_mm;
@@ -35,7 +36,8 @@ struct PlantSettings {
   double tendon_stiffness_n_per_mm;
   double friction;
   double presliding_mm;
-  std::array<Vec3, kTendons> base_hole_mm, top_hole_mm;  // in the plates' planes
+  int tendons;                                               // 3 to kTendonsMost
+  std::array<Vec3, kTendonsMost> base_hole_mm, top_hole_mm;  // in the plates' planes
   int rod_elements;
   int rod_extra_modes;
 };
@@ -44,16 +46,18 @@ class Plant {
  public:
   explicit Plant(const PlantSettings& settings);
 
-  // Goes to the equilibrium at these free tendon lengths, at rest.
-  void settle(const std::array<double, kTendons>& lengths_mm);
+  // Held so, away from rest: compressed to the shortest of these free tendon lengths.
+  void place(const PerTendon& lengths_mm, const Aside& aside);
+  // Goes to the equilibrium at these free tendon lengths, at rest; from straight.
+  void settle(const PerTendon& lengths_mm);
   // One implicit step of the overdamped rod.
-  void step(const std::array<double, kTendons>& lengths_mm, double duration_s);
+  void step(const PerTendon& lengths_mm, double duration_s);
 
-  const std::array<double, kTendons>& lengths_mm() const { return lengths_mm_; }
+  const PerTendon& lengths_mm() const { return lengths_mm_; }
   const Shape& shape() const { return state_.shape; }
   const Rod& rod() const { return rod_; }
-  const std::array<double, kTendons>& tension_n() const { return state_.tension_n; }
-  const std::array<TendonPath, kTendons>& paths() const { return state_.paths; }
+  const PerTendon& tension_n() const { return state_.tension_n; }
+  const std::array<TendonPath, kTendonsMost>& paths() const { return state_.paths; }
 
   // Scaled gradient norm that the last solution left; below kTolerance it counts
   // as solved.
@@ -63,6 +67,9 @@ class Plant {
   int iterations() const { return iterations_; }
   // Still moving though its tendons are not.
   bool creeping() const { return creeping_; }
+  // Whether the energy rises in every direction from here. Asks anew, so it takes long.
+  bool stable();
+  double energy_n_mm() const { return state_.energy; }
   long evaluations() const { return evaluations_; }
 
   // Root of N mm: moves the tip by less than 0.01 mm.
@@ -75,9 +82,9 @@ class Plant {
     Modes gradient;   // friction's load included
     Modes geometric;  // the part of the gradient that needs a secant
     Shape shape;
-    std::array<TendonPath, kTendons> paths;
-    std::array<Modes, kTendons> path_gradient;
-    std::array<double, kTendons> tension_n;
+    std::array<TendonPath, kTendonsMost> paths;
+    std::array<Modes, kTendonsMost> path_gradient;
+    PerTendon tension_n;
   };
 
   // Touching coils of one element.
@@ -91,11 +98,12 @@ class Plant {
   void solve();
   bool leave_saddle();
   void settle_friction(State& state);
+  bool falls_nowhere(Cholesky& solver) const;
   void add_weight(State& state) const;
   bool solid_contact(const Strain& strain, SolidContact& contact) const;
   void add_solid(State& state) const;
   void add_solid_hessian(const State& state, Matrix& hessian) const;
-  Modes frozen_gradient(const State& state, const std::array<double, kTendons>& tension_n) const;
+  Modes frozen_gradient(const State& state, const PerTendon& tension_n) const;
   void rebuild_secant();
   void update_secant(const State& from, const State& to);
   Matrix hessian(const State& state) const;
@@ -105,17 +113,17 @@ class Plant {
   Rod rod_;
   double solid_penalty_;
   double solid_ratio_;
-  std::array<double, kTendons> lengths_mm_{};
+  PerTendon lengths_mm_{};
   Modes anchor_{};      // where the damper pulls to: the last step's end
   double damping_ = 0;  // relative to the rod's own stiffness
   // Friction of each tendon in the bore. It has no energy: within a step of Newton's
   // it is a constant load, and its derivative is a column beside the tendon's gradient.
-  std::array<double, kTendons> slide_from_{};  // at the step's start: -1 unwinds, 1 winds
-  std::array<double, kTendons> slide_{};
-  std::array<double, kTendons> path_from_mm_{};
+  PerTendon slide_from_{};  // at the step's start: -1 unwinds, 1 winds
+  PerTendon slide_{};
+  PerTendon path_from_mm_{};
   bool may_slide_ = false;
   Modes friction_load_{};
-  std::array<Modes, kTendons> friction_column_{};
+  std::array<Modes, kTendonsMost> friction_column_{};
   State state_{};
   State trial_{};
   Matrix secant_{};  // geometric stiffness, learnt from step to step

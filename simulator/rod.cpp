@@ -151,12 +151,15 @@ Vec3 Rod::midpoint(const Shape& shape, int element) const {
   return shape.position[element] + shape.rotation[element] * position;
 }
 
-Modes Rod::compressed(double length_mm) const {
+Modes Rod::compressed(double length_mm, const Aside& aside) const {
+  // The lowest mode of each strain is the same all along.
+  const double wanted[kComponents] = {
+      aside.bend_x_rad / length_mm_, aside.bend_y_rad / length_mm_, 0,
+      aside.shift_x_mm / length_mm_, aside.shift_y_mm / length_mm_, length_mm / length_mm_ - 1};
   Modes modes{};
   for (int m = 0; m < modes_; ++m) {
-    if (table_[m].component == kAxial && table_[m].order == 0) {
-      modes[m] = (length_mm / length_mm_ - 1) / basis_[0][m];
-    }
+    if (table_[m].order == 0)
+      modes[m] = wanted[table_[m].component] / basis_[0][m];
   }
   return modes;
 }

@@ -57,6 +57,11 @@ struct Shape {
   std::array<Mat3, kMaxElements> step_rotation;
 };
 
+// Away from straight: bent about x and y, and sheared along them.
+struct Aside {
+  double bend_x_rad, bend_y_rad, shift_x_mm, shift_y_mm;
+};
+
 using Wrenches = std::array<Wrench, kMaxStations>;
 
 class Rod {
@@ -81,8 +86,8 @@ class Rod {
   Vec3 midpoint(const Shape& shape, int element) const;
 
   double element_mm() const { return element_mm_; }
-  // Start value: uniformly compressed to `length_mm`.
-  Modes compressed(double length_mm) const;
+  // Start value: uniformly compressed to `length_mm`, and put aside.
+  Modes compressed(double length_mm, const Aside& aside) const;
 
  private:
   struct Mode {

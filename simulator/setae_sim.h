@@ -127,6 +127,28 @@ int setae_world_remove_board(setae_world*);
 int setae_world_pulse(setae_world*, int servo, double width_us);
 int setae_world_sense(setae_world*, double* pressure_hpa);
 
+/* The spring alone, between 3 to 8 tendons in true holes: the plant of a world before its
+ * start, without servos, friction and time. `angle_rad`: of each tendon about the axis. Null:
+ * setae_world_error(world) says why. */
+#define SETAE_TENDONS_MOST 8
+typedef struct setae_spring setae_spring;
+setae_spring* setae_world_spring(setae_world*, int tendons, const double* angle_rad);
+void setae_spring_destroy(setae_spring*);
+
+typedef struct {
+  double position_mm[3]; /* of the top U in frame D */
+  double rotation[9];    /* D to U, row major */
+  double tension_n[SETAE_TENDONS_MOST];
+  double energy_n_mm;
+  double residual; /* scaled gradient norm; below 1e-4 it is solved */
+  int32_t stable;  /* the energy rises in every direction from here */
+} setae_rest;
+
+/* Where it comes to rest with these free tendon lengths when let go from: bent by so much about
+ * x and y, its top moved along x and y. */
+int setae_spring_rest(setae_spring*, const double* length_mm, const double bend_rad[2],
+                      const double shift_mm[2], setae_rest* out);
+
 #ifdef __cplusplus
 }
 #endif

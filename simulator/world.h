@@ -20,6 +20,7 @@
 #include "parameters.h"
 #include "plant.h"
 #include "servo.h"
+#include "settings.h"
 
 namespace setae {
 namespace sim {
@@ -37,7 +38,7 @@ struct Body {
 struct Top {
   Vec3 position_mm;
   Mat3 rotation;
-  std::array<double, kTendons> tension_n;
+  PerTendon tension_n;
 };
 
 // Another plant in the place of the spring: asked at every sample for the answer to

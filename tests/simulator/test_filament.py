@@ -18,15 +18,16 @@ Array = npt.NDArray[np.float64]
 Setup = Callable[[World], object]
 
 TIP_MM = -(70.0 + 65.0)  # of the free robot under the arm
-LENGTH_MM, DIAMETER_MM, MODULUS = 53.0, 0.8, 2500.0
+LENGTH_MM, DIAMETER_MM, MODULUS = 53.0, 1.0, 2500.0
 BENDING = MODULUS * np.pi / 64 * DIAMETER_MM**4
-GEL, GEL_ROTATION = 0.08, 5.0
-HPA_PER_N, HPA_PER_N_MM = 150.0, 80.0
+GEL, GEL_ROTATION = 0.08, 8.0
+HPA_PER_N, HPA_PER_N_MM = 150.0, 100.0
 STILL = {
     "sensor.noise_hpa": 0.0,
     "sensor.drift_hpa_per_sqrt_s": 0.0,
     "plant.gravity_m_s2": 0.0,
     "bristle.relaxation_fraction": 0.0,
+    "bristle.pressure_saturation_hpa": 240.0,
     "bristle.motion_axial_hpa_s2_per_mm": 0.0,
     "bristle.motion_lateral_hpa_s2_per_mm": 0.0,
 }
@@ -98,10 +99,10 @@ def pushed_aside(by_mm: float, **parameters: float) -> Touch:
 def test_a_light_push_goes_into_the_gel() -> None:
     for stiffness in (0.05, GEL, 0.12):
         found = pressed(1.0, gel_stiffness_n_per_mm=stiffness, pressure_hpa_per_n_mm=0).hpa[-1]
-        assert found == pytest.approx(stiffness * HPA_PER_N, rel=0.05)
-    assert pressed(1.0, pressure_hpa_per_n=300, pressure_hpa_per_n_mm=0).hpa[-1] == pytest.approx(
-        2 * pressed(1.0, pressure_hpa_per_n_mm=0).hpa[-1], rel=1e-3
-    )
+        assert unsaturated(found) == pytest.approx(stiffness * HPA_PER_N, rel=0.05)
+    double = pressed(1.0, pressure_hpa_per_n=300, pressure_hpa_per_n_mm=0).hpa[-1]
+    once = pressed(1.0, pressure_hpa_per_n_mm=0).hpa[-1]
+    assert unsaturated(double) == pytest.approx(2 * unsaturated(once), rel=1e-3)
 
 
 @pytest.mark.parametrize("diameter_mm", [0.6, 0.8, 1.0])
@@ -116,13 +117,23 @@ def test_a_push_at_the_tip_s_side_bends_it_as_a_beam_does(
     ).hpa[-1]  # fmt: skip
     deflection_mm = 3.0 + diameter_mm / 2
     force = deflection_mm / (LENGTH_MM**3 / (3 * bending) + LENGTH_MM**2 / gel_rotation)
-    assert found == pytest.approx(HPA_PER_N_MM * force * LENGTH_MM, rel=0.12)
+    assert unsaturated(found) == pytest.approx(HPA_PER_N_MM * force * LENGTH_MM, rel=0.12)
     stiffer = pushed_aside(3.0, filament_modulus_n_per_mm2=2 * MODULUS).hpa[-1]
     assert stiffer > 1.2 * pushed_aside(3.0).hpa[-1]
 
 
-def test_the_side_is_far_softer_than_the_tip() -> None:
-    assert pushed_aside(1.0).hpa[-1] < 0.5 * pressed(1.0).hpa[-1]
+def test_a_push_at_the_side_bends_and_does_not_compress() -> None:
+    assert abs(pushed_aside(3.0, pressure_hpa_per_n_mm=0).hpa[-1]) < 0.5
+    assert pushed_aside(3.0).hpa[-1] > 10.0
+
+
+def test_pressure_saturates() -> None:
+    soft = pressed(5.0, pressure_saturation_hpa=40).hpa
+    assert soft[-1] == pytest.approx(40 * (1 - np.exp(-unsaturated(pressed(5.0).hpa[-1]) / 40)))
+
+
+def unsaturated(hpa: float, most_hpa: float = 240.0) -> float:
+    return float(-most_hpa * np.log(1 - hpa / most_hpa))
 
 
 @pytest.mark.parametrize("diameter_mm", [0.6, 0.8])
@@ -141,7 +152,7 @@ def test_it_buckles_where_euler_says(diameter_mm: float) -> None:
         8.0, filament_diameter_mm=diameter_mm, friction=2, filament_bow_mm=0.2,
         pressure_hpa_per_n_mm=0,
     )  # fmt: skip
-    assert found.hpa[-1] / HPA_PER_N == pytest.approx(euler_n, rel=0.15)
+    assert unsaturated(found.hpa[-1]) / HPA_PER_N == pytest.approx(euler_n, rel=0.15)
 
 
 def test_it_buckles_to_the_side_of_its_bow() -> None:

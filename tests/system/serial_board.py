@@ -10,6 +10,7 @@ import termios
 import threading
 import time
 import tty
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -32,6 +33,7 @@ class SerialBoard:
         self._closing = threading.Event()
         self._pull = threading.Event()
         self._pulled = threading.Event()
+        self._asked: list[tuple[Callable[[], bool], threading.Event]] = []
         self._thread = threading.Thread(target=self._run, daemon=True)
         self.plug()
         self._thread.start()
@@ -51,6 +53,16 @@ class SerialBoard:
         self._pull.clear()
         self._pulled.clear()
         os.close(self._keeps_open)
+
+    def do(self, action: Callable[[], object]) -> None:
+        """Do something to the world, between two of its slices; returns when it is done."""
+        self.do_when(lambda: (action(), True)[1])
+
+    def do_when(self, ready: Callable[[], bool]) -> None:
+        """Return when something holds, asked between slices: the world is the thread's own."""
+        happened = threading.Event()
+        self._asked.append((ready, happened))
+        happened.wait()
 
     def forget_exclusive(self) -> None:
         """What a serial driver does when the last who had the port open is gone."""
@@ -81,6 +93,10 @@ class SerialBoard:
             while data := self._world.run(until_us):
                 if self._board >= 0:
                     os.write(self._board, data)
+            for asked in list(self._asked):
+                if asked[0]():
+                    self._asked.remove(asked)
+                    asked[1].set()
             if self._pull.is_set() and self._board >= 0:
                 os.close(self._board)
                 self._board = -1

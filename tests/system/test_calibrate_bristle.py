@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from tests.system.serial_board import SerialBoard
 
 from setae import record
 from setae.cli import main
 from setae.config import load
 from setae.errors import InputError
-from setae.experiments.bristle import Move, Threshold, moves_in, threshold
+from setae.experiments.bristle import Move, Threshold, moves_in, surface_mm, threshold
+from setae.sim import World
+
+RAISED_MM = 30.0
 
 
 def moved(*peaks_hpa: float, touched: bool) -> list[Move]:
@@ -42,6 +49,49 @@ def test_moves_and_touches_part_near_the_papers_threshold_and_give_a_usable_frag
     assert len((out / "moves.csv").read_text().splitlines()) == 21
     # The robot was left alone with nothing in its way.
     assert record.read(out / "bristle.mcap").array("/telemetry", "state")[-1] == "relaxed"
+
+
+def test_a_board_at_a_port_and_a_person_who_puts_something_below_it(tmp_path: Path) -> None:
+    """In real time, as with hardware: no simulator is seen from the command."""
+    config = load()
+    floor_mm = -(surface_mm(config) + RAISED_MM)
+    out = tmp_path / "run"
+    with World(seed=1) as world:
+        world.add_box((0.0, 0.0, floor_mm - 10.0), (200.0, 200.0, 20.0))
+        world.start()
+        with SerialBoard(world) as board:
+            command = subprocess.Popen(
+                [sys.executable, "-u", "-m", "setae.cli", "calibrate", "bristle", "--port",
+                 board.port, "--accept-jump", "--moves", "2", "--touches", "2", "--no-report",
+                 "--out", str(out)],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "COLUMNS": "400"},
+            )  # fmt: skip
+            assert command.stdin is not None
+            assert command.stdout is not None
+            asked = []
+            for line in command.stdout:
+                if "press Enter" not in line:
+                    continue
+                asked.append(line)
+                if "Put something flat" in line:
+                    board.do(lambda: world.arm_move((0.0, 0.0, -RAISED_MM), 200.0, 2000.0))
+                elif "Take it away" in line:
+                    board.do(lambda: world.arm_move((0.0, 0.0, 0.0), 200.0, 2000.0))
+                board.do_when(lambda: not world.arm_moving)
+                command.stdin.write("\n")
+                command.stdin.flush()
+            _, errors = command.communicate()
+    assert command.returncode == 0, errors
+    assert len(asked) == 3
+    assert "15 mm below the bristle's tip" in asked[1]
+    log = record.read(out / "bristle.mcap")
+    assert not log.simulated
+    moves = moves_in(log)
+    assert [sum(move.touched == kind for move in moves) for kind in (False, True)] == [2, 2]
+    chosen = threshold(moves)
+    assert (chosen.false, chosen.missed) == (0, 0)
+    assert "this robot" in (out / "bristle.toml").read_text()
 
 
 def test_where_the_two_kinds_overlap_the_threshold_makes_the_fewest_errors() -> None:

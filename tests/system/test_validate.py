@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,7 +98,7 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_where_it_was(
 
     monkeypatch.setattr(interrupts, "poll", press_ctrl_c)
     code, _, errors = run(capsys, *arguments)
-    assert code == 130
+    assert code == 130, errors
     assert "--resume" in errors
     assert len(errors.splitlines()) == 1
     (before,) = runs_in(out)
@@ -261,6 +262,44 @@ def test_causes_alone_and_mended_with_the_largest_gain_first(
     code, _, errors = run(capsys, "--port", "nowhere", "--causes")
     assert code == 1
     assert "--sim" in errors
+
+
+def test_causes_go_on_where_they_were_interrupted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "run"
+    plant = tmp_path / "plant.toml"
+    plant.write_text('[simulator]\n"tendon.offset_mm_0" = 3.0\n')
+    options = ["--sim", "--config", str(plant), "--targets", "5", "--causes", "--no-report",
+               "--out", str(out)]  # fmt: skip
+    module = sys.modules["setae.cli.validate"]
+    driven: list[str] = []
+    poses: list[Pose] = []
+    drive = module.validate
+
+    def counted(*arguments: Any, **named: Any) -> Any:
+        driven.append(named["model"])
+        if len(driven) == 4:
+            raise KeyboardInterrupt
+        if not poses:  # which are as good as any, for the other cases too
+            poses.extend(drive(*arguments, **named))
+        return poses
+
+    monkeypatch.setattr(module, "validate", counted)
+    code, _, errors = run(capsys, *options)
+    assert code == 130, errors
+    assert "--resume" in errors
+    first = record.read(out / "causes.mcap").events("case")
+    assert len(first) == 2  # the first call was for the targets themselves
+    code, printed, errors = run(capsys, *options, "--resume")
+    assert code == 0, errors
+    assert "mending gains" in printed
+    cases = record.read(out / "causes.mcap").events("case")
+    assert len(driven) == 4 + len(cases) - len(first)
+    assert [case.data for case in cases[:2]] == [case.data for case in first]
+    code, _, errors = run(capsys, *options, "--resume", "--noise-mm", "1")
+    assert code == 1
+    assert "another noise_sd_mm" in errors
 
 
 def _picture(folder: Path, effects: Sequence[causes.Effect]) -> Path:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
@@ -126,9 +126,12 @@ def validate_command(
         drive = _Drive(where, config, noise, out, resume=resume, force=force)
         folder = drive.all(models, wanted, accept_jump=accept_jump)
         if causes:
-            with ended_early(lambda: [f"Its targets are done. {later(folder)}"],
-                             what="the study of causes is not whole"):  # fmt: skip
-                _study(where, config, models[0], wanted, noise, folder)
+            left = (
+                f"Its targets are done. {later(folder)} `setae validate --causes --resume --out "
+                f"{folder}` with the same options goes on with the other causes."
+            )
+            with ended_early(lambda: [left], what="the study of causes is not whole"):
+                _study(where, config, models[0], wanted, noise, folder, resume=resume)
     logs = sorted(folder.glob("*.mcap"))
     read = [record.read(log) for log in logs]
     found = runs.read(runs.of_kind(read, runs.EXPERIMENT))
@@ -327,16 +330,24 @@ def _study(
     targets: Sequence[Target],
     noise: Noise,
     folder: Path,
+    *,
+    resume: bool,
 ) -> None:
     """Drive on the plant's imperfections one by one; one log of all."""
     values = rig.simulator_parameters(config, where.seed)
     study = why.cases(rig.plants.by_cause(values), model, list(tendons.MODELS))
-    path = folder / f"{why.EXPERIMENT}.mcap"
-    make_way(path)  # an earlier study of the same run
     metadata = {"experiment": why.EXPERIMENT, "simulated": True, "seed": where.seed,
-                "plant": config.plant, "config": config.to_toml()}  # fmt: skip
+                "plant": config.plant, "config": config.to_toml(), "targets": len(targets),
+                "noise_sd_mm": noise.sd_mm, "noise_seed": noise.seed}  # fmt: skip
+    path = folder / f"{why.EXPERIMENT}.mcap"
+    known = why.known(record.read(path), metadata) if resume and path.exists() else {}
+    make_way(path)
     with record.Recorder(path, metadata=metadata) as recorder, console.status("") as status:
-        for number, case in enumerate(study, start=1):
+        # A second of log time each, so that each is on the disk when the next begins.
+        left = [case for case in study if case.name not in known]
+        for number, done in enumerate(known.values(), start=1):
+            recorder.experiment(number * 1_000_000, "case", done)
+        for number, case in enumerate(left, start=len(known) + 1):
             status.update(f"Cause {number} of {len(study)}: {case.cause or case.kind}")
             plant = dataclasses.replace(
                 config, plant="ideal", simulator=tuple(sorted(case.parameters.items()))
@@ -350,4 +361,4 @@ def _study(
             ):  # fmt: skip
                 opened.robot.enable()
                 poses = validate(opened.robot, targets, _look(opened, noise), model=case.model)
-            recorder.experiment(number, "case", why.told(case, poses))
+            recorder.experiment(number * 1_000_000, "case", why.told(case, poses))

@@ -12,10 +12,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from setae.errors import InputError
 from setae.experiments.accuracy import OVERALL, Pose, by_group
 from setae.record import Log
 
-__all__ = ["EXPERIMENT", "Case", "Effect", "cases", "effects", "told"]
+__all__ = ["EXPERIMENT", "Case", "Effect", "cases", "effects", "known", "told"]
 
 EXPERIMENT: Final = "causes"
 """What the metadata of such a log names."""
@@ -52,6 +53,11 @@ class Case:
     cause: str
     model: str
     parameters: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        """What no other case of a study has."""
+        return f"{self.kind} {self.cause}".strip()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,6 +154,24 @@ def told(case: Case, poses: Sequence[Pose]) -> dict[str, Any]:
         "mean_mm": whole.mean_mm,
         "sd_mm": whole.sd_mm,
     }
+
+
+def known(log: Log, metadata: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Read what a study that ended early has found already, by the cases' names.
+
+    Raises
+    ------
+    InputError
+        It was another study: of another plant, of other targets or another noise.
+    """
+    for key, value in metadata.items():
+        if log.metadata.get(key) != value:
+            raise InputError(
+                f"The causes in {log.path} were driven with another {key}.",
+                "Resume them with the options of the first call, or begin in a new folder.",
+            )
+    return {f"{case.data['kind']} {case.data['cause']}".strip(): dict(case.data)
+            for case in log.events("case")}  # fmt: skip
 
 
 def effects(log: Log) -> tuple[Effect, ...]:

@@ -10,17 +10,21 @@ from setae.sim import plants, plugin
 from setae.sim.library import SimulationError
 from setae.sim.plugin import PluginError
 from setae.sim.solids import add_solid
+from setae.sim.spring import Rest, Spring
 from setae.sim.stage import Follower, SimulatedStage
 from setae.sim.transport import SimTransport
-from setae.sim.world import SensorFault, Truth, World, parameter_names
+from setae.sim.truth import SensorFault, Truth
+from setae.sim.world import World, parameter_names
 
 __all__ = [
     "Follower",
     "PluginError",
+    "Rest",
     "SensorFault",
     "SimTransport",
     "SimulatedStage",
     "SimulationError",
+    "Spring",
     "Truth",
     "World",
     "add_solid",

@@ -26,6 +26,7 @@ __all__ = [
     "TENDONS",
     "CPlantInput",
     "CPlantOutput",
+    "CRest",
     "CTruth",
     "PlantStep",
     "SimulationError",
@@ -34,6 +35,7 @@ __all__ = [
 
 BACKBONE_POINTS = 21
 TENDONS = 4
+TENDONS_MOST = 8
 
 #: A library to use instead of the installed one, for work on the simulator.
 LIBRARY_VARIABLE = "SETAE_SIM_LIBRARY"
@@ -94,6 +96,19 @@ class CPlantOutput(ctypes.Structure):
     )
 
 
+class CRest(ctypes.Structure):
+    """`setae_rest` of setae_sim.h."""
+
+    _fields_ = (
+        ("position_mm", c_double * 3),
+        ("rotation", c_double * 9),
+        ("tension_n", c_double * TENDONS_MOST),
+        ("energy_n_mm", c_double),
+        ("residual", c_double),
+        ("stable", c_int32),
+    )
+
+
 #: `setae_plant_step` of setae_sim.h.
 PlantStep = ctypes.CFUNCTYPE(c_int, c_void_p, POINTER(CPlantInput), POINTER(CPlantOutput))
 
@@ -144,42 +159,45 @@ def load() -> ctypes.CDLL:
     vector = POINTER(c_double)
     status = c_int
     signatures: dict[str, tuple[type | None, tuple[type, ...]]] = {
-        "create": (world, (c_uint64,)),
-        "destroy": (None, (world,)),
-        "error": (c_char_p, (world,)),
-        "parameter_count": (c_int, ()),
-        "parameter_name": (c_char_p, (c_int,)),
-        "set": (status, (world, c_char_p, c_double)),
-        "get": (status, (world, c_char_p, vector)),
-        "add_tube": (status, (world, vector, c_double)),
-        "add_box": (status, (world, vector, vector, c_double)),
-        "add_prism": (status, (world, vector, vector, c_double, c_double, c_double)),
-        "add_ring": (status, (world, vector, c_double, c_double)),
-        "add_ellipsoid": (status, (world, vector, vector, c_double)),
-        "surface": (status, (world, c_double, c_double, c_double, c_double, vector)),
-        "use_plant": (status, (world, PlantStep, c_void_p)),
-        "start": (status, (world, vector)),
-        "now_us": (c_int64, (world,)),
-        "send": (status, (world, c_char_p, c_size_t)),
-        "run": (status, (world, c_int64, c_char_p, POINTER(c_size_t))),
-        "arm_move": (status, (world, vector, c_double, c_double)),
-        "arm_follow": (status, (world, vector)),
-        "arm_stop": (status, (world, c_double)),
-        "truth": (status, (world, POINTER(CTruth))),
-        "sensor_fault": (status, (world, c_int)),
-        "supply": (status, (world, c_int)),
-        "stop_switch": (status, (world, c_int)),
-        "reset_board": (status, (world,)),
-        "remove_board": (status, (world,)),
-        "pulse": (status, (world, c_int, c_double)),
-        "sense": (status, (world, vector)),
+        "world_create": (world, (c_uint64,)),
+        "world_destroy": (None, (world,)),
+        "world_error": (c_char_p, (world,)),
+        "world_parameter_count": (c_int, ()),
+        "world_parameter_name": (c_char_p, (c_int,)),
+        "world_set": (status, (world, c_char_p, c_double)),
+        "world_get": (status, (world, c_char_p, vector)),
+        "world_add_tube": (status, (world, vector, c_double)),
+        "world_add_box": (status, (world, vector, vector, c_double)),
+        "world_add_prism": (status, (world, vector, vector, c_double, c_double, c_double)),
+        "world_add_ring": (status, (world, vector, c_double, c_double)),
+        "world_add_ellipsoid": (status, (world, vector, vector, c_double)),
+        "world_surface": (status, (world, c_double, c_double, c_double, c_double, vector)),
+        "world_use_plant": (status, (world, PlantStep, c_void_p)),
+        "world_start": (status, (world, vector)),
+        "world_now_us": (c_int64, (world,)),
+        "world_send": (status, (world, c_char_p, c_size_t)),
+        "world_run": (status, (world, c_int64, c_char_p, POINTER(c_size_t))),
+        "world_arm_move": (status, (world, vector, c_double, c_double)),
+        "world_arm_follow": (status, (world, vector)),
+        "world_arm_stop": (status, (world, c_double)),
+        "world_truth": (status, (world, POINTER(CTruth))),
+        "world_sensor_fault": (status, (world, c_int)),
+        "world_supply": (status, (world, c_int)),
+        "world_stop_switch": (status, (world, c_int)),
+        "world_reset_board": (status, (world,)),
+        "world_remove_board": (status, (world,)),
+        "world_pulse": (status, (world, c_int, c_double)),
+        "world_sense": (status, (world, vector)),
+        "world_spring": (c_void_p, (world, c_int, vector)),
+        "spring_destroy": (None, (c_void_p,)),
+        "spring_rest": (status, (c_void_p, vector, vector, vector, POINTER(CRest))),
     }
     for name, (result, arguments) in signatures.items():
         try:
-            function = getattr(library, f"setae_world_{name}")
+            function = getattr(library, f"setae_{name}")
         except AttributeError as error:
             raise SimulatorMissingError(
-                f"The compiled simulator {path} is of another version: it has no {name}.",
+                f"The compiled simulator {path} is of another version: it has no setae_{name}.",
                 "Install setae again.",
             ) from error
         function.restype = result

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from enum import IntEnum
 from types import TracebackType
 from typing import Any, Self
 
@@ -15,83 +13,15 @@ from numpy.typing import NDArray
 from setae.errors import InputError, SetaeError
 from setae.sim.library import CPlantInput, CPlantOutput, CTruth, PlantStep, SimulationError, load
 from setae.sim.plugin import Drive, Plant, PluginError, checked
+from setae.sim.truth import SensorFault, Truth
 
-__all__ = ["SensorFault", "Truth", "World", "parameter_names"]
+__all__ = ["World", "parameter_names"]
 
 _BAD_ARGUMENT = -1
 _PLANT_FAILED = -5
 _READ_ROOM = 4096
 
 Array = NDArray[np.float64]
-
-
-class SensorFault(IntEnum):
-    """What can be wrong with the simulated pressure sensor."""
-
-    NONE = 0
-    ABSENT = 1
-    SILENT = 2
-    BUS = 3
-    WRONG = 4
-    STUCK = 5
-    RANGE = 6
-    NOISY = 7
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Truth:
-    """What the simulator knows and no host can measure.
-
-    Attributes
-    ----------
-    time_us
-        Virtual time since power-on.
-    arm_mm, arm_target_mm
-        Origin of frame D in the world and where it goes, (3,).
-    arm_moving
-        Whether the arm moves.
-    attached
-        Whether each servo has pulses.
-    pulse_us
-        What the board puts out, (4,); 0 where a servo has no pulses.
-    servo_length_mm
-        Free tendon length that each servo leaves, (4,).
-    tension_n
-        Tension of each tendon, (4,); 0 where it is slack.
-    backbone_mm
-        The spring's centre line in frame D, from D to U, (21, 3).
-    rotation
-        Frame U in frame D, (3, 3).
-    filament_mm
-        Root and tip E of the undeformed filament in frame D, (2, 3).
-    contact_depth_mm
-        Deepest penetration of the undeformed filament; 0 without contact.
-    contact_point_mm
-        Where that is in the world, (3,); None without contact.
-    bent_tip_mm
-        The filament's tip at the sensor's last sample, bent as it is, in the world, (3,).
-    pressure_hpa
-        Pressure at the sensor's last sample, noise included.
-    plant_residual
-        Scaled gradient norm of the equilibrium; below 1e-4 it is solved.
-    """
-
-    time_us: int
-    arm_mm: Array
-    arm_target_mm: Array
-    arm_moving: bool
-    attached: tuple[bool, bool, bool, bool]
-    pulse_us: Array
-    servo_length_mm: Array
-    tension_n: Array
-    backbone_mm: Array
-    rotation: Array
-    filament_mm: Array
-    contact_depth_mm: float
-    contact_point_mm: Array | None
-    bent_tip_mm: Array
-    pressure_hpa: float
-    plant_residual: float
 
 
 def parameter_names() -> tuple[str, ...]:
@@ -279,6 +209,14 @@ class World:
             )
         )
         return z_mm.value
+
+    def spring(self, tendons: int, angles_rad: ctypes.Array[ctypes.c_double]) -> int:
+        """Handle of this world's spring between other tendons, for `setae.sim.Spring`."""
+        handle = self._library.setae_world_spring(self._live, tendons, angles_rad)
+        if not handle:
+            text = self._library.setae_world_error(self._live).decode()
+            raise InputError(f"Simulator: {text}.")
+        return int(handle)
 
     def start(self, arm_mm: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Switch the power on, with the origin of frame D at `arm_mm` in the world.
