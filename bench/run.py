@@ -288,6 +288,7 @@ FIGURES: dict[str, Callable[[], Iterable[Figure]]] = {
     **damage.FIGURES,
     **link_model.FIGURES,
     **validation.FIGURES,
+    **scan.FIGURES,
     **perception.FIGURES,
     "random_obstacles": random_obstacles,
     "kinematics_speed": kinematics_speed,

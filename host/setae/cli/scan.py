@@ -284,7 +284,7 @@ class _Run:
         """Do them all."""
         with ended_early(self._what_is_left, what="robot and arm are stopped"):
             results = [self._one(job) for job in jobs]
-        _print_table(results)
+        _print_table(results, jobs[0].config)
         say(f"Logs: {self._folder()}")
 
     def report(self) -> None:
@@ -384,10 +384,14 @@ def _name(scene: TableScene) -> str:
     return "an empty table" if what is None else f"{what.shape}, size {what.scale:g}"
 
 
-def _print_table(results: Sequence[ScanResult]) -> None:
-    table = Table()
+def _print_table(results: Sequence[ScanResult], config: Config) -> None:
+    table_mm = results[0].scene.get("table_z_mm")
+    extended_mm = config.scan_lengths_mm[1] + config.geometry.tip_offset_mm
+    base_mm = -extended_mm if table_mm is None else float(table_mm)
+    above = "extended tip" if table_mm is None else "table"
+    table = Table(caption=f"highest: above the {above}")
     table.add_column("mode")
-    for name in ("robot time", "touched", "inferred", "empty", "flagged", "heights"):
+    for name in ("robot time", "touched", "inferred", "empty", "flagged", "highest"):
         table.add_column(name, justify="right")
     for result in results:
         mark = result.height_map.mark
@@ -399,6 +403,6 @@ def _print_table(results: Sequence[ScanResult]) -> None:
             str(int((mark == "inferred").sum())),
             str(int((mark == "empty").sum())),
             str(int(np.isin(mark, ("slipped", "double", "lost")).sum())),
-            f"{heights_mm.min():.1f} to {heights_mm.max():.1f} mm" if len(heights_mm) else "–",
+            f"{heights_mm.max() - base_mm:.1f} mm" if len(heights_mm) else "–",
         )
     console.print(table)

@@ -300,6 +300,8 @@ class Steps:
 
     def _in_touch(self, refusal: RefusedError) -> None:
         """After a refused baseline: too little pressure for a contact, too much for none."""
+        if refusal.reason == _IN_TOUCH and self.short:
+            refusal.add_note("Begin a scan where the extended bristle touches nothing.")
         if refusal.reason != _IN_TOUCH or self.short:
             raise refusal
         self.emit("in_touch", position_mm=list(self.position_mm), length_mm=self.length_mm)

@@ -1,0 +1,102 @@
+"""The scan of a surface: how long it takes, how long the robot, how near the truth."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from bench.figure import Figure
+
+from setae import record
+from setae.config import load
+from setae.experiments.scan import Mode, simulate
+from setae.experiments.scan.quality import EDGE_MM, EDGE_STEP_MM, Quality, quality, surface_of
+from setae.objects import SHAPES, random_object, table_scene
+
+OBJECT_SEED = 1
+WALL_SHAPE = "lidded_container"
+
+
+@dataclass(frozen=True)
+class Run:
+    """One simulated scan of the paper's square."""
+
+    robot_s: float
+    wall_s: float
+    quality: Quality
+
+
+@cache
+def run(shape: str, mode: Mode) -> Run:
+    config = load()
+    scene = table_scene(config, random_object(shape, OBJECT_SEED))
+    lowest_mm = -(config.scan_lengths_mm[1] + config.geometry.tip_offset_mm)
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "scan.mcap"
+        start_s = time.process_time()
+        result = simulate(config, scene, mode=mode, log=log)
+        wall_s = time.process_time() - start_s
+        surface = surface_of(record.read(log))
+    assert surface is not None, "a simulated scan knows the truth"
+    return Run(
+        robot_s=result.duration_s, wall_s=wall_s, quality=quality(result, surface, lowest_mm)
+    )
+
+
+def scan_times() -> Iterable[Figure]:
+    """How long a user waits, and how long the robot works, in both modes."""
+    square = "21 x 21 places, 200 x 200 mm, simulated"
+    yield Figure(
+        "scan_441_wall_s",
+        round(run(WALL_SHAPE, "paper").wall_s, 1),
+        "s",
+        f"the paper's cycle over {WALL_SHAPE}, {square}, with its log: processor time of one core",
+    )
+    paper_s = {shape: run(shape, "paper").robot_s for shape in SHAPES}
+    adaptive_s = {shape: run(shape, "adaptive").robot_s for shape in SHAPES}
+    shares = ", ".join(f"{shape} {adaptive_s[shape] / paper_s[shape]:.2f}" for shape in SHAPES)
+    objects = f"mean of the five objects, seed {OBJECT_SEED}"
+    yield Figure(
+        "scan_robot_time_s",
+        round(sum(paper_s.values()) / len(SHAPES), 1),
+        "s",
+        f"virtual time of the paper's cycle, {square}, {objects}",
+    )
+    yield Figure(
+        "scan_adaptive_robot_time_s",
+        round(sum(adaptive_s.values()) / len(SHAPES), 1),
+        "s",
+        f"virtual time of the adaptive mode on the same; share of the paper's: {shares}",
+    )
+
+
+def scan_heights() -> Iterable[Figure]:
+    """How near the true surface the measured heights are, in both modes."""
+    where = (
+        f"heights against the simulator's true surface, five objects, seed {OBJECT_SEED}, away from"
+        f" edges: true heights within {EDGE_MM:g} mm along x and y differ by less than"
+        f" {EDGE_STEP_MM:g} mm"
+    )
+    modes: tuple[tuple[str, Mode], ...] = (
+        ("scan_height_rms_mm", "paper"),
+        ("scan_adaptive_height_rms_mm", "adaptive"),
+    )
+    for name, mode in modes:
+        found = [run(shape, mode).quality for shape in SHAPES]
+        places = sum(one.places for one in found)
+        square_mm2 = sum(one.places * one.rms_mm**2 for one in found if one.places)
+        missed = sum(one.missed for one in found)
+        yield Figure(
+            name,
+            round(math.sqrt(square_mm2 / places), 2),
+            "mm",
+            f"mode {mode}: {where}; {places} places, {missed} missed there",
+        )
+
+
+FIGURES = {"scan_times": scan_times, "scan_heights": scan_heights}

@@ -1,0 +1,81 @@
+"""The scan with a simulated robot on a UR arm, in real time."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+
+import numpy as np
+import pytest
+from tests.ur.controller import FakeController, patient
+
+from setae import rig
+from setae.cli import main
+from setae.config import Config, load
+from setae.errors import ArmBoxError, ArmFrozenError
+from setae.experiments.events import Event
+from setae.experiments.scan import scan, simulate
+from setae.objects import ScanObject, TableScene, table_scene
+from setae_protocol.messages import State
+
+ARM_TIMEOUT_S = 120.0  # a busy machine
+
+
+def quick() -> tuple[Config, TableScene]:
+    """Two places by two, with an object at the second column."""
+    config = load()
+    settings = dataclasses.replace(
+        config.scan, area_mm=(30.0, 30.0), step_mm=30.0, extend_speed_mm_s=60.0
+    )
+    config = dataclasses.replace(config, scan=settings, ur=patient(config.ur))
+    what = ScanObject(shape="eraser", x_mm=40.0, y_mm=15.0, yaw_deg=90.0)
+    return config, table_scene(config, what)
+
+
+def test_a_scan_on_the_arm_finds_what_one_in_the_simulator_finds(fake: FakeController) -> None:
+    config, scene = quick()
+    with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
+        opened.robot.enable()
+        result = scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
+        assert opened.stage.position_mm == pytest.approx((0, 0, 0), abs=0.3)
+    simulated = simulate(config, scene)
+    ours, theirs = result.height_map.height_mm, simulated.height_map.height_mm
+    assert (np.isfinite(ours) == np.isfinite(theirs)).all()
+    assert np.nanmax(np.abs(ours - theirs)) < 1.0
+
+
+def test_an_arm_that_freezes_in_a_step_stops_the_robot(fake: FakeController) -> None:
+    config, scene = quick()
+
+    def on_event(event: Event) -> None:
+        if event.name == "step":
+            threading.Timer(0.2, fake.freeze).start()
+
+    with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
+        opened.robot.enable()
+        with pytest.raises(ArmFrozenError):
+            scan(opened.robot, opened.stage, on_event=on_event, arm_timeout_s=ARM_TIMEOUT_S)
+        assert opened.robot.state is State.STOPPED
+
+
+def test_a_corner_outside_of_the_box_is_told_before_anything_moves(fake: FakeController) -> None:
+    config, scene = quick()
+    wide = dataclasses.replace(config.scan, area_mm=(2000.0, 30.0))
+    config = dataclasses.replace(config, scan=wide)
+    with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
+        opened.robot.enable()
+        with pytest.raises(ArmBoxError):
+            scan(opened.robot, opened.stage)
+        assert opened.stage.position_mm == pytest.approx((0, 0, 0), abs=0.1)
+        assert opened.robot.lengths_mm == pytest.approx([70.0] * 4, abs=0.1)
+
+
+def test_the_dry_run_shows_the_corners(
+    fake: FakeController, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["scan", "--sim", "--stage", fake.url, "--area", "40", "--dry-run"])
+    printed = capsys.readouterr()
+    assert ended.value.code == 0, printed.err
+    assert "40.0, 40.0, 0.0" in printed.out
+    assert "Nothing was moved" in printed.out
