@@ -31,6 +31,7 @@ from bench import (  # noqa: E402  # needs the path
     link_model,
     motion,
     perception,
+    scan,
     validation,
 )
 from bench import plant as plant_figures  # noqa: E402

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,7 +51,7 @@ def eraser_at(middle_mm: float) -> ScanObject:
 class Blocks:
     """A scene of boxes."""
 
-    solids: Sequence[Solid]
+    solids: tuple[Solid, ...]
 
     def describe(self) -> dict[str, Any]:
         return {"scene": {}}
@@ -66,7 +65,7 @@ def wall(x_mm: float, *, top_mm: float, thick_mm: float = 4.0) -> Blocks:
         edges_mm=(thick_mm, 400.0, high_mm),
         yaw_rad=0.0,
     )
-    return Blocks([box])
+    return Blocks((box,))
 
 
 @pytest.mark.parametrize("mode", MODES)
