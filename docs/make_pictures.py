@@ -20,7 +20,16 @@ import theory_pictures
 
 from setae import record, tendons
 from setae.experiments import causes, runs, samples, shapes, study
-from setae.report import animation, bristle, cluster, explore, pictures, validation_pictures
+from setae.report import (
+    animation,
+    bristle,
+    cluster,
+    explore,
+    pictures,
+    scan,
+    scan_pictures,
+    validation_pictures,
+)
 from setae.report import causes as why
 from setae.report.trial import telling
 
@@ -90,6 +99,10 @@ def main(arguments: list[str]) -> None:
         felt = Path(folder) / "bristle"
         run_setae("calibrate", "bristle", "--moves", "200", "--touches", "200", "--out", str(felt))
         bristle.picture(PICTURES / "bristle.png", record.read(felt / "bristle.mcap"))
+        scanned = Path(folder) / "scan"
+        modes = ("--mode", "paper", "--mode", "adaptive")
+        run_setae("scan", "--object", "eraser:1", *modes, "--out", str(scanned))
+        scan_pictures.overview_picture(PICTURES / "scan.png", scan.scans(scanned))
         objects = Path(folder) / "objects"
         # Those that the bench scores.
         trials = study.Plan(seeds=tuple(range(2000, 2005)), modes=("paper",))

@@ -36,6 +36,13 @@ contact}, ``level_end``, ``arm_return``, ``trial_end`` {descent_mm, contacts},
 ``trial_aborted`` {reason}. ``contact`` is None or a mapping with ``time_us``,
 ``tip_mm`` (the bristle's tip in frame D), ``tip_world_mm``, ``uncertainty_mm``,
 ``pressure_hpa``, ``baseline_hpa``.
+
+Events of the scan of a surface: ``true_surface`` {step_mm, height_mm} (simulated only, at
+time 0), ``scan_start`` {mode, order, step_mm, columns, rows, known, earlier_s}, ``step``
+{target_mm, length_mm}, ``step_contact`` {position_mm, contact}, ``in_touch``, ``place``
+{column, row, x_mm, y_mm, mark, height_mm, contact}, ``arm_return``, ``scan_end``
+{duration_s}, ``scan_aborted`` {reason}. Metadata: ``mode``, ``part`` (from 1, where a scan
+was resumed), and as scene {table_z_mm, object}.
 """
 
 from __future__ import annotations

@@ -83,7 +83,7 @@ def cloud_axes(axes: Any, scan: Scan) -> None:
             )  # fmt: skip
     low, high = _box(scan, points)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(tuple(high - low))
+    axes.set_box_aspect(tuple(high - low), zoom=0.88)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     axes.tick_params(labelsize=8.5)
     axes.set_title(_title(scan))
