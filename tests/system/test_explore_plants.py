@@ -19,6 +19,14 @@ from setae.scene import Obstacle, tube_scene
 OBSTACLE = Obstacle(below_tip_mm=35.0)
 
 
+def test_the_robot_that_errs_like_the_papers_stops_at_a_cube_on_any_side_but_plus_x() -> None:
+    config = dataclasses.replace(load(), plant="paper_like")
+    scene = tube_scene(config, dataclasses.replace(OBSTACLE, azimuth_deg=180.0))
+    with rig.open("sim://", config=config, scene=scene) as opened:
+        opened.robot.enable()
+        assert explore(opened.robot, opened.stage).descent_mm == 40.0
+
+
 @pytest.mark.parametrize("plant", ["ideal", "paper_like", "random:2"])
 def test_each_plant_gives_the_papers_answer_or_the_report_says_why_not(
     plant: str, tmp_path: Path
