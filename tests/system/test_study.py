@@ -6,6 +6,7 @@ import contextlib
 import importlib
 import json
 import socket
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -199,3 +200,14 @@ def test_the_command_leaves_table_and_report_and_goes_on(
         main([*command, "--no-report"])
     assert ended.value.code == 0
     assert "1 of 2 runs are done, 1 failed" in capsys.readouterr().out
+
+
+def test_a_missing_extra_is_told_before_anything_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "--seeds", "1", "--out", str(tmp_path / "study")])
+    assert ended.value.code == 1
+    assert "setae[study]" in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()

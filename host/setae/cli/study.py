@@ -82,6 +82,7 @@ def study(
             objects=object or (), seeds=seeds, modes=mode or (), plants=plant or (),
             vary=vary or (), config=config, keep_logs=keep_logs,
         )  # fmt: skip
+    studies.require()
     goes_on = out is not None and (out / studies.RUNS).is_dir()
     folder = new_folder("study", out, force=force or goes_on)
     rows = _conduct(plan.runs(), folder, workers, scheduler)

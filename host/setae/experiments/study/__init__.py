@@ -6,7 +6,7 @@ what came out, and `table` makes one table of it.
 
 from __future__ import annotations
 
-from setae.experiments.study.conducting import RUNS, Row, conduct
+from setae.experiments.study.conducting import RUNS, Row, conduct, require
 from setae.experiments.study.one import MAP, Outcome, perform
 from setae.experiments.study.plan import Plan, Run, load, of_options
 from setae.experiments.study.table import read_table, write_table
@@ -23,5 +23,6 @@ __all__ = [
     "of_options",
     "perform",
     "read_table",
+    "require",
     "write_table",
 ]

@@ -18,7 +18,7 @@ from setae.errors import InputError, SetaeError
 from setae.experiments.study.one import Outcome, perform
 from setae.experiments.study.plan import Run
 
-__all__ = ["RUNS", "Row", "conduct", "finished"]
+__all__ = ["RUNS", "Row", "conduct", "finished", "require"]
 
 Row: TypeAlias = Mapping[str, Any]
 """A run's line of the table."""
@@ -26,6 +26,18 @@ Row: TypeAlias = Mapping[str, Any]
 RUNS: Final = "runs"
 _ROW: Final = "row.json"
 _CONNECT_S: Final = 10
+
+
+def require() -> None:
+    """Import what a study needs, before any work is done.
+
+    Raises
+    ------
+    ExtraMissingError
+        The extra ``study`` isn't installed.
+    """
+    for module in ("distributed", "pyarrow", "scipy", "threadpoolctl"):
+        extras.load(module, "study", "A study")
 
 
 def conduct(
