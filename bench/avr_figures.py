@@ -8,6 +8,7 @@ from functools import cache, partial
 
 from bench import avr, avr_line, avr_reaction
 from bench.figure import Figure
+from tests.avr.stack import deepest_in_tests
 
 from setae_protocol.messages import BAUD, SERVOS
 
@@ -178,18 +179,20 @@ def line() -> Iterable[Figure]:
 
 
 def stack() -> Iterable[Figure]:
-    """How deep the stack gets, over all that is measured here."""
+    """How deep the stack gets, over all that is measured here and all tests on the chip."""
     many = (
         _contacts(), _stops(), _commands(), _idle_queries(), _loaded_queries(), _refills(),
     )  # fmt: skip
     found = [_loaded().stack_bytes, _full_line().stack_bytes, _decoding().stack_bytes]
     for boards in many:
         found += [one.stack_bytes for one in boards]
+    in_tests, boards_in_tests = deepest_in_tests()
     yield Figure(
         "stack_deepest_bytes",
-        max(found),
+        max(*found, in_tests),
         "B",
-        f"{_UNO}: RAM below the stack that was written to since power-on, over all of its figures",
+        f"{_UNO}: RAM below the stack that was written to since power-on, over all of its figures, "
+        f"and over {boards_in_tests} boards of tests/avr and tests/system",
     )
 
 

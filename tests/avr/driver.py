@@ -56,6 +56,8 @@ WIDE_LIMITS = SetLimits(
 )
 # So much is on a loaded line ahead of whatever the host sends.
 _BACKLOG_CYCLES = 8_000 * CYCLES_PER_US
+# The level at rest has settled so long after power-on.
+_SETTLED_US = 400_000
 _BYTE_US = 10_000_000 // BAUD
 _UNUSED = Segment(duration_frames=0, target_ticks=(0, 0, 0, 0))
 # A pulse begins within this of its frame's start, which telemetry tells to better than 2 ms.
@@ -102,8 +104,7 @@ class Driver:
         """Open the session, and let the board play everything it can."""
         self.session.open()
         self.session.request(WIDE_LIMITS)
-        # The level at rest settles, as it does on a robot that is switched on.
-        self.session.run_for(300_000)
+        self.session.run_for(2 * SERVO_FRAME_US)
 
     def enable(self, ticks: Ticks) -> None:
         """Attach the servos, and wait until they all are."""
@@ -138,6 +139,9 @@ class Driver:
 
     def guard(self, threshold_hpa: float, *, deadline_frames: int = 1000) -> None:
         """Start a guarded move whose reflex is to hold."""
+        settled = _SETTLED_US - self.session.now_us
+        if settled > 0:
+            self.session.run_for(settled)
         self.session.request(
             GuardMessage(
                 epoch=self.session.epoch,

@@ -198,11 +198,17 @@ class Uno:
         The ELF file that it runs.
     pressure_hpa
         What the sensor measures at first.
+
+    Attributes
+    ----------
+    firmware
+        The ELF file.
     """
 
     def __init__(self, firmware: Path = FIRMWARE, *, pressure_hpa: float = 1013.25) -> None:
         self._handle: int | None = None
         self._library = _load()
+        self.firmware = firmware
         if not firmware.is_file():
             raise SimulatorMissingError(
                 f"There is no firmware {firmware}.",
@@ -224,6 +230,11 @@ class Uno:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was freed."""
+        return not self._handle
 
     def close(self) -> None:
         """Free it. Closing twice is fine."""

@@ -8,12 +8,15 @@ import pytest
 from tests.avr.programs import (
     CLI,
     DDRB,
+    EE_READY,
+    EECR,
     GTCCR,
     NOP,
     OCR0A,
     OCR1AH,
     OCR1AL,
     OCR2A,
+    PORTB,
     PUSH,
     RAM,
     SEI,
@@ -29,13 +32,19 @@ from tests.avr.programs import (
     TCNT1L,
     TCNT2,
     TIFR0,
+    TIMER1_COMPA,
+    TIMSK1,
     UBRR0L,
+    UCSR0A,
     UCSR0B,
     UDR0,
     boot,
+    copy,
     cycle_when,
     delay,
     store,
+    wait_for,
+    with_handlers,
 )
 
 D9, D11 = 0, 2  # as servos
@@ -153,6 +162,51 @@ def test_the_usb_chip_hands_over_a_full_packet_at_once(tmp_path: Path) -> None:
         data, end = uno.receive()
     assert len(data) == 64
     assert end < 64 * 705 + 2 * FRAME
+
+
+@pytest.mark.parametrize("slower", [-0.02, 0.021, 0.04])
+def test_a_byte_at_nearly_the_receivers_rate_is_received(tmp_path: Path, slower: float) -> None:
+    """Section 20.8.3: up to 4.5 % off; sampled at the receiver's own rate."""
+    program = [*store((UBRR0L, 3), (UCSR0B, 0x10)), *wait_for(UCSR0A, 7), *copy(UDR0, RAM)]
+    with boot(tmp_path, program) as uno:
+        uno.run_to(100)
+        uno.send(b"\x35", bit_cycles=64 * (1 + slower))
+        uno.run_to(2_000)
+        assert uno.peek(RAM) == 0x35
+        assert uno.statistics().receive_frame_errors == 0
+
+
+def test_a_byte_at_another_rate_is_broken(tmp_path: Path) -> None:
+    """A sender that is a tenth slower: the receiver looks for the stop bit within the last 0."""
+    with boot(tmp_path, store((UBRR0L, 3), (UCSR0B, 0x10))) as uno:
+        uno.run_to(100)
+        uno.send(b"\x00", bit_cycles=64 * 1.1)
+        uno.run_to(3_000)
+        assert uno.statistics().receive_frame_errors == 1
+
+
+def test_an_interrupt_is_entered_and_left_in_four_cycles(tmp_path: Path) -> None:
+    """Section 7.7.1: to the vector, over its jump, and back."""
+    main = store((DDRB, 2), (OCR1AH, 0), (OCR1AL, 200), (TIMSK1, 2), (TCCR1B, 1))
+    with boot(
+        tmp_path, with_handlers([*main, SEI, *[NOP] * 300], {TIMER1_COMPA: store((PORTB, 2))})
+    ) as uno:
+        uno.run_to(500)
+        (edge,) = uno.edges()
+        took = uno.handler(TIMER1_COMPA)
+    jump, load, write = 3, 1, 2
+    started = jump + 5 * STORE_CYCLES - write
+    matched = started + 200 + 1
+    assert edge.cycle == matched + 4 + jump + load
+    assert (took.count, took.total) == (1, 4 + jump + load + write + 4)
+
+
+def test_one_instruction_runs_between_two_interrupts(tmp_path: Path) -> None:
+    """Section 7.7.1. The EEPROM's interrupt comes as long as nothing is written."""
+    main = [*store((EECR, 0x08)), SEI, *[NOP] * 40, *store((RAM, 1))]
+    with boot(tmp_path, with_handlers(main, {EE_READY: []})) as uno:
+        cycle_when(uno, RAM, 0xFF, 1)
+        assert uno.handler(EE_READY).count == pytest.approx(41, abs=2)
 
 
 def test_interrupts_off_is_measured_to_the_cycle(tmp_path: Path) -> None:

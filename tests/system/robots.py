@@ -131,7 +131,11 @@ def bench(
         session.subscribe(note)
         session.open()
         robot.prepare()
-        yield made
+        try:
+            yield made
+        finally:
+            if uno is not None:
+                uno.close()
 
 
 @contextmanager
