@@ -64,7 +64,7 @@ def test_servos_attach_one_after_the_other_at_the_commanded_pose(driver: Driver)
 
 def test_pulses_come_every_20_ms_to_the_cycle(driver: Driver) -> None:
     driver.enable(POSE)
-    driver.session.run_for(500_000)
+    driver.session.run_for(200_000)
     for pulses in by_servo(driver.pulses()):
         rises = [pulse.rise for pulse in pulses]
         periods = {later - earlier for earlier, later in pairwise(rises)}

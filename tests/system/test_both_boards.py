@@ -12,6 +12,7 @@ from setae.errors import BoardResetError, FaultError, RefusedError, StoppedError
 from setae.experiments.events import Event
 from setae.experiments.explore import explore
 from setae.link.lossy import Faults
+from setae.link.session import Session
 from setae.scene import Obstacle
 from setae_protocol.messages import State
 
@@ -105,6 +106,17 @@ def test_an_open_stop_switch_stops_it_until_it_is_closed_and_resumed(back_end: s
         made.run(0.1)
         robot.resume()
         assert robot.state is State.HOLDING
+
+
+def test_stored_limits_are_in_force_after_a_reset(back_end: str) -> None:
+    with bench(back_end=back_end) as made:
+        made.robot.store_limits()
+        assert made.robot.limits_stored
+        stored = made.robot.status.stored_crc
+        made.reset_board()
+        with pytest.raises(BoardResetError):
+            made.run(5.0)
+        assert Session(made.line, session_id=8).open().limits_crc == stored
 
 
 def test_a_reset_in_mid_move_is_noticed_and_nothing_goes_on(back_end: str) -> None:
