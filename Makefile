@@ -16,9 +16,9 @@ PIO := .ci/platformio/pio
 PORT ?=
 FUZZ_SECONDS ?= 600
 FUZZ_JOBS ?= 1
-# A file's tests stay together: they share what is costly to make. One process more than there are
-# cores: the arm's tests wait for a clock.
-ON_ALL_CORES = --numprocesses $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --dist loadfile --no-loadscope-reorder
+# A file's tests stay together: they share what is costly to make. No more processes than cores: some
+# talk to programs that have timeouts of their own.
+ON_ALL_CORES := --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 NATIVE_SOURCES := CMakeLists.txt $(shell find firmware/lib simulator -name '*.cpp' -o -name '*.h')
 # The simulated UNO, for tests only: simavr is GPL, and nothing of it is shipped.
