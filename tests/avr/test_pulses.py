@@ -120,10 +120,10 @@ def test_pulses_end_whole_where_they_are_switched_off(driver: Driver) -> None:
         driver.session.run_for(20_000)
         driver.uno.run_for_us(phase_us)
         driver.session.request(Limp(reserved=0))
-        driver.session.run_for(40_000)
+        driver.session.run_for(30_000)
         assert driver.session.state is State.RELAXED
         ended = driver.pulses()
-        driver.session.run_for(60_000)
+        driver.session.run_for(30_000)
         assert driver.pulses() == ended
     for servo, pulses in enumerate(by_servo(driver.pulses())):
         assert {pulse.width for pulse in pulses} == {POSE[servo] * CYCLES_PER_TICK}
