@@ -158,6 +158,20 @@ def test_a_contact_in_a_step_stops_the_arm_and_the_board_retracts() -> None:
     assert length_mm == pytest.approx(20, abs=0.1)
 
 
+def test_a_bent_bristle_comes_free_though_it_presses_hard() -> None:
+    # Retracting from a contact in a step pressed harder than an unguarded motion may, and the
+    # scan ended there.
+    config = coarse(4)
+    bristle = dataclasses.replace(config.bristle, coarse_threshold_hpa=17.0)
+    config = dataclasses.replace(config, bristle=bristle)
+    scene = wall(45.0, top_mm=-105.0, thick_mm=30.0)
+    with rig.open("sim://", config=config, scene=scene) as opened:
+        opened.robot.enable()
+        result = scan(opened.robot, opened.stage, mode="adaptive")
+    assert result.complete
+    assert np.isfinite(result.height_map.height_mm[:, 2]).all()
+
+
 def test_what_is_touched_beside_a_place_and_not_at_it_is_lost() -> None:
     # A thin wall between two columns: the steps run into it, the extensions miss it.
     config = coarse(2)

@@ -10,7 +10,7 @@ from typing import Any
 from setae import kinematics, workspace
 from setae.config import Config
 from setae.contact import Contact
-from setae.errors import HeightWindowError, RefusedError
+from setae.errors import HeightWindowError, RefusedError, TrippedError
 from setae.experiments.events import Event, OnEvent
 from setae.link.events import Event as LinkEvent
 from setae.link.events import TelemetryReceived
@@ -25,6 +25,7 @@ _HERE_MM = 0.02
 # Shorter differences of length are not worth a move of the spring.
 _SAME_LENGTH_MM = 0.3
 _WORTH_LOWERING_MM = 3.0
+_RETRACTIONS = 4
 # The board's reason where the pressure at rest is not what it is without a contact.
 _IN_TOUCH = "tare_far"
 
@@ -166,15 +167,27 @@ class Steps:
     def retract(self, length_mm: float | None = None) -> None:
         """Shorten the spring; to its least length of the scan, unless told otherwise."""
         target_mm = self.short_mm if length_mm is None else length_mm
-        way_mm = self.length_mm - target_mm
-        if way_mm > _SAME_LENGTH_MM:
-            self._robot.compress(target_mm, speed_mm_s=self._settings.retract_speed_mm_s)
+        for attempt in range(1, _RETRACTIONS + 1):
+            if self.length_mm - target_mm <= _SAME_LENGTH_MM:
+                return
+            try:
+                self._robot.compress(target_mm, speed_mm_s=self._settings.retract_speed_mm_s)
+            except TrippedError:
+                # A bristle that is bent against something may press harder before it comes
+                # free. The board allows for that once it is told to go on.
+                if attempt == _RETRACTIONS:
+                    raise
+                self._robot.resume()
 
     def lower(self, length_mm: float) -> None:
         """Extend to a length that is known to be free, where that saves more than it takes."""
-        way_mm = length_mm - self.length_mm
-        if way_mm > _WORTH_LOWERING_MM:
+        if length_mm - self.length_mm <= _WORTH_LOWERING_MM:
+            return
+        try:
             self._robot.compress(length_mm, speed_mm_s=self._settings.retract_speed_mm_s)
+        except TrippedError:
+            self._robot.resume()
+            self.retract()
 
     def go(self, x_mm: float, y_mm: float, *, retract_to_mm: float | None = None) -> bool:
         """Take the arm to a place with the bristle watching.
