@@ -154,27 +154,26 @@ class _Tracer:
         around_mm = self._heights_around(cell[0], cell[0], cell[1], 1)
         top_mm = max([*around_mm, self._top_mm(cell)], key=_nan_low)
         steps.retract(min(self._length_over(top_mm), steps.length_mm))
+        usual_mm = 2 * self._settings.clearance_mm
+        near_mm = usual_mm + top_mm - min(around_mm) if around_mm else usual_mm
+        hasty = self._nothing_beside(cell)
         feeling = None
         if not (steps.extended or math.isnan(top_mm)):
-            near_mm = 2 * self._settings.clearance_mm
-            if around_mm:
-                near_mm += top_mm - min(around_mm)
-            unlikely = self._nothing_beside(cell)
-            feeling = steps.go_and_feel(*place_mm, near_mm=0.0 if unlikely else near_mm)
+            feeling = steps.go_and_feel(*place_mm, near_mm=0.0 if hasty else near_mm)
             if feeling is None and not steps.short:
                 # Higher than what is known around it: once more, from farther up.
-                steps.retract(
-                    max(steps.short_mm, steps.length_mm - 3 * self._settings.clearance_mm)
-                )
-                feeling = steps.go_and_feel(*place_mm)
-            elif unlikely and feeling is not None and feeling.contact is not None:
-                # Touched in haste: measure it.
-                steps.lower(steps.length_over_mm(feeling.height_mm))
-                feeling = steps.feel(near_mm=near_mm)
+                hasty = True
+                steps.retract(max(steps.short_mm, steps.length_mm - 1.5 * usual_mm))
+                feeling = steps.go_and_feel(*place_mm, near_mm=0.0)
         if feeling is None:
+            hasty = True
             steps.retract()
-            feeling = steps.go_and_feel(*place_mm)
+            feeling = steps.go_and_feel(*place_mm, near_mm=0.0)
             assert feeling is not None, "a short robot that touches something raises"
+        if hasty and feeling.contact is not None:
+            # Touched in haste: measure it.
+            steps.lower(steps.length_over_mm(feeling.height_mm))
+            feeling = steps.feel(near_mm=1.5 * usual_mm) or feel_short(steps)
         if feeling.mark == "double":
             # In touch at once: from farther up it is seen whether it is so.
             steps.retract()
