@@ -99,7 +99,7 @@ const Entry kEntries[] = {
     SETAE_ONE(bristle, pressure_hpa_per_n, 150, 0, 10000),
     SETAE_ONE(bristle, pressure_hpa_per_n_mm, 100, 0, 10000),
     // It is never reached: the gel gives way to the sides.
-    SETAE_ONE(bristle, pressure_saturation_hpa, 150, 1, 240),
+    SETAE_ONE(bristle, pressure_saturation_hpa, 80, 1, 240),
     SETAE_ONE(bristle, relaxation_fraction, 0.15, 0, 0.95),
     SETAE_ONE(bristle, relaxation_time_s, 0.5, 0.01, 100),
     SETAE_ONE(bristle, motion_axial_hpa_s2_per_mm, 0.007, 0, 1),

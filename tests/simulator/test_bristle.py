@@ -61,7 +61,7 @@ def test_the_arm_s_moves_do_not_look_like_contact(make_driver: MakeDriver) -> No
 
 
 def test_firm_contact_is_far_above_the_threshold(make_driver: MakeDriver) -> None:
-    """Measured at 1, 2, 5 and 10 mm: 10, 20, 48 and 113 hPa, an eighth more at once."""
+    """Measured at 1, 2, 5 and 10 mm: 11, 20, 43 and 62 hPa, a sixth more at once."""
     held = {}
     for depth_mm in (1.0, 2.0, 5.0, 10.0):
         driver = make_driver(setup=floor_below_tip(2.0))
@@ -72,7 +72,7 @@ def test_firm_contact_is_far_above_the_threshold(make_driver: MakeDriver) -> Non
     assert list(held.values()) == sorted(held.values())
     assert held[5.0] > 1.5 * THRESHOLD_HPA
     assert held[1.0] < THRESHOLD_HPA
-    assert held[10.0] < 150  # in the sensor's range
+    assert held[10.0] < 80  # the gel gives way
 
 
 def test_held_contact_relaxes_and_undershoots_when_released(make_driver: MakeDriver) -> None:
