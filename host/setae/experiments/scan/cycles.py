@@ -43,8 +43,8 @@ def safe(steps: Steps, survey: Survey, order: str, found: Found) -> None:
 
 
 def feel_short(steps: Steps) -> Feeling:
-    """Extend from the shortest; the bristle can't be in touch before."""
-    feeling = steps.feel()
+    """Extend; where the bristle was in touch before, that made the robot short: then again."""
+    feeling = steps.feel() or steps.feel()
     assert feeling is not None, "a refusal of the short robot is an error"
     return feeling
 
