@@ -54,18 +54,24 @@ struct Late {
       }
     }
   }
-  // Ten ticks a frame.
-  void play() {
+  void hold() {
     board.poll();
     send(protocol::Hello{protocol::kProtocolVersion, protocol::kSchemaHash, 7, 0});
     session = 7;
     send(protocol::Enable{{1700, 1700, 1700, 1700}});
     run_frames(25);
+  }
+  // Ten ticks a frame.
+  void begin() {
     protocol::Segments message = {};
     message.epoch = board.epoch();
     message.count = 1;
     message.segments[0] = {50, {2200, 2200, 2200, 2200}};
     send(message);
+  }
+  void play() {
+    hold();
+    begin();
     run_frames(5);
     REQUIRE(hal.step_ticks == 10);
   }
@@ -103,4 +109,18 @@ TEST_CASE("no step is longer when a frame has begun before its pulses were set")
     late.run_frames(1);
     CHECK(late.hal.step_ticks <= 10);
   }
+}
+
+TEST_CASE("a motion's first step is not lost when a frame has begun before it was set") {
+  Late late;
+  late.hold();
+  late.hal.calls = 1;
+  late.begin();
+  CHECK(late.hal.step_ticks == 0);
+  for (int frame = 1; frame <= 50; ++frame) {
+    late.run_frames(1);
+    CHECK(late.hal.step_ticks == 10);
+  }
+  late.run_frames(1);
+  CHECK(late.hal.step_ticks == 0);
 }

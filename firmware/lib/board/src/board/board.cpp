@@ -101,7 +101,7 @@ void Board::begin_frame(const BoardTime& now) {
     trip(protocol::TripCause::kDeadline);
   watch_hold_timeout();
   advance_motion();
-  put_out();
+  put_out(current_);
 }
 
 void Board::latch_frame(const BoardTime& now) {
@@ -180,15 +180,18 @@ void Board::watch_hold_timeout() {
   start_line(rest_pose_.ticks, kTimeoutSlewTicks < fastest ? kTimeoutSlewTicks : fastest);
 }
 
-void Board::put_out() {
+// From the next frame on.
+void Board::put_out(const Pulses& set_before) {
   if (attached_ == kAllServos && current_attached_ == kAllServos) {
     limits_.confine(current_, next_);
   }
   if (hal_.set_pulses(next_, attached_) == now_.frame)
     return;
-  // The loop was late: another frame has begun, with the pulses of the one before it.
-  now_ = hal_.now();
-  history_.add(current_);
+  // The loop was late: another frame has begun, with what was set before.
+  const Pulses planned = next_;
+  next_ = set_before;
+  latch_frame(hal_.now());
+  next_ = planned;
 }
 
 void Board::check_consistency() {
@@ -223,10 +226,16 @@ Verdict Board::raise(Event event) {
 void Board::play_if_ready() {
   if (player_.empty() || detector_.guard() == Guard::kTaring)
     return;
-  if (mode_ == Mode::kHolding && detector_.guard() == Guard::kOff) {
+  const bool begins = mode_ == Mode::kHolding;
+  if (begins && detector_.guard() == Guard::kOff)
     detector_.coarse_on(limits_.coarse_threshold_raw());
-  }
   raise(Event::kPlay);
+  if (!begins)
+    return;
+  // The first step is not for the next frame's start to make, but for its pulses to show.
+  const Pulses held = next_;
+  player_.step(next_);
+  put_out(held);
 }
 
 void Board::freeze() {

@@ -58,7 +58,7 @@ class Board {
   SETAE_OWN_FRAME void begin_frame(const BoardTime& now);
   void advance_motion();
   void watch_hold_timeout();
-  void put_out();
+  void put_out(const Pulses& set_before);
   void check_consistency();
 
   // Makes the pulses last set those of this frame.
@@ -68,7 +68,7 @@ class Board {
   Verdict ask(Event event) const;
   // The same, and changes the mode unless the event is refused.
   Verdict raise(Event event);
-  void play_if_ready();
+  SETAE_OWN_FRAME void play_if_ready();
   // The servos stay where they are in this frame, and the plans are dropped.
   void freeze();
   // What is queued or guarded is forgotten. The new epoch tells it from what the host sent

@@ -194,8 +194,12 @@ Verdict Board::decide() {
       return relax();
     case MessageType::kLimp:
       return limp();
-    case MessageType::kSegments:
-      return segments();
+    case MessageType::kSegments: {
+      const Verdict verdict = segments();
+      if (verdict.ok())
+        play_if_ready();
+      return verdict;
+    }
     case MessageType::kGuard:
       return guard();
     case MessageType::kDisarm:
@@ -297,9 +301,7 @@ Verdict Board::segments() {
   ran_dry_ = false;
   for (uint8_t i = 0; i < message.count; ++i)
     player_.push(message.segments[i]);
-  verdict = raise(Event::kSegments);
-  play_if_ready();
-  return verdict;
+  return raise(Event::kSegments);
 }
 
 // All of them before any is queued.

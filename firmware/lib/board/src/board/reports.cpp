@@ -103,9 +103,7 @@ bool Board::send_hello_reply() {
 }
 
 bool Board::send_limits() {
-  protocol::Limits reply = {};
-  static_cast<protocol::SetLimits&>(reply) = limits_.in_force();
-  return transmitter_.send(header(), reply);
+  return transmitter_.send_as(protocol::Limits::kType, header(), limits_.in_force());
 }
 
 bool Board::send_pong() {

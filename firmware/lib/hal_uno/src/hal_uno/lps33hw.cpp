@@ -34,7 +34,8 @@ constexpr uint16_t kEarliestWait = 12000 / 16;
 constexpr uint16_t kLatestWait = 14000 / 16;
 // With D2 wired the timer only steps in where an edge was missed.
 constexpr uint16_t kWiredWait = 16000 / 16;
-// Each look that comes to nothing takes 0.25 ms. One of them shows that the sample was not late.
+// Each look that comes to nothing takes so long. One of them shows that the sample was not late.
+constexpr uint8_t kLookTicks = 16;
 constexpr uint8_t kWaitStep = 4;
 constexpr uint8_t kLooksMax = 12;
 
@@ -149,15 +150,33 @@ void Lps33hw::take_sample(const BoardTime& now, SensorReading& reading) {
     reading.pressure_raw = static_cast<int32_t>(raw << 8) / 256;  // sign of 24 bits
     reading.sampled = servo_pulses::at(static_cast<uint16_t>(begun_ticks + kStatusTicks));
     since_frame_ = now.frame;
-    if (by_timer_ && twi_.misses() == 0 && wait_ > kEarliestWait)
-      wait_ -= kWaitStep;
-    if (by_timer_ && twi_.misses() > 1 && wait_ < kLatestWait)
-      wait_ += kWaitStep;
+    if (by_timer_)
+      follow(twi_.misses());
     return expect_next(static_cast<uint16_t>(servo_pulses::ticks() - begun_ticks));
   }
   if (now.frame - since_frame_ > kSilentFrames)
     return fail(Sensor::kSilent, now);
   expect_next(0xFFFF);  // at once: it is overdue
+}
+
+// How long to wait for the next sample, by how many looks this one took in vain.
+void Lps33hw::follow(uint8_t misses) {
+  if (misses != 0) {
+    late_before_ = false;
+    if (misses > 1)
+      wait_ += kWaitStep + (misses - 2) * kLookTicks;
+    if (wait_ > kLatestWait)
+      wait_ = kLatestWait;
+    return;
+  }
+  // It was there already, nobody knows for how long. The second time the sensor is faster than it
+  // was, and what is late adds up from sample to sample: begin anew.
+  if (late_before_ || wait_ < kEarliestWait + 2 * kWaitStep) {
+    wait_ = kEarliestWait;
+  } else {
+    wait_ -= 2 * kWaitStep;
+  }
+  late_before_ = true;
 }
 
 void Lps33hw::expect_next(uint16_t elapsed_ticks) {

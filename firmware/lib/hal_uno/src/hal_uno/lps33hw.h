@@ -38,6 +38,7 @@ class Lps33hw {
 
   void on_done(const BoardTime& now, SensorReading& reading);
   void take_sample(const BoardTime& now, SensorReading& reading);
+  void follow(uint8_t misses);
   void expect_next(uint16_t elapsed_ticks);
   void fail(protocol::Sensor status, const BoardTime& now);
 
@@ -48,6 +49,7 @@ class Lps33hw {
   bool running_ = false;
   bool by_timer_ = false;
   uint16_t wait_ = 0;         // from one fetch to the next, Timer0 ticks
+  bool late_before_ = false;  // the last sample was there at the first look
   uint32_t since_frame_ = 0;  // the last sample, or failure
 };
 

@@ -24,8 +24,14 @@ class Transmitter {
   // Fills in the header's type and sequence. False where too much waits before it.
   template <typename Message>
   bool send(const protocol::BoardHeader& header, const Message& message) {
+    return send_as(Message::kType, header, message);
+  }
+  // Under another message's type, whose payload is the same.
+  template <typename Message>
+  bool send_as(protocol::MessageType type, const protocol::BoardHeader& header,
+               const Message& message) {
     protocol::Wire<Message> wire(message);
-    return send_bytes(header, Message::kType, wire.bytes(), Message::kSize);
+    return send_bytes(header, type, wire.bytes(), Message::kSize);
   }
 
  private:

@@ -12,9 +12,13 @@ namespace protocol {
 
 // Stuffs one byte at a time into a sink, which has
 //   void stage(uint8_t index, uint8_t byte)   in any order
-//   void publish(uint8_t count)               so many bytes are final
+//   void publish(uint8_t end)                 all before this index are final
 class CobsEncoder {
  public:
+  // The sink's index of the first byte; indices wrap at 256.
+  explicit CobsEncoder(uint8_t first = 0)
+      : at_(static_cast<uint8_t>(first + 1)), code_at_(first) {}
+
   template <typename Sink>
   SETAE_HOT void push(uint8_t byte, Sink& sink) {
     if (byte != 0) {
@@ -25,7 +29,7 @@ class CobsEncoder {
     ++at_;
   }
 
-  // Returns how many bytes there are.
+  // Returns the index after the last byte.
   template <typename Sink>
   uint8_t finish(Sink& sink) {
     end_run(sink);
@@ -40,8 +44,8 @@ class CobsEncoder {
     code_at_ = at_;
   }
 
-  uint8_t at_ = 1;
-  uint8_t code_at_ = 0;
+  uint8_t at_;
+  uint8_t code_at_;
 };
 
 // Into plain memory.

@@ -4,7 +4,7 @@ namespace setae {
 namespace protocol {
 
 uint8_t encode_frame(const uint8_t* frame, uint8_t size, uint8_t* wire) {
-  return encode_frame(MemorySink(wire), frame, size, nullptr, 0);
+  return encode_frame(MemorySink(wire), 0, frame, size, nullptr, 0);
 }
 
 namespace {

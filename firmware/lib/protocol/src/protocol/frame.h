@@ -17,33 +17,35 @@ static_assert(BoardHeader::kSize + kBoardPayloadMax + kCrcBytes <= kFrameBytesMa
 static_assert(HostHeader::kSize + kHostPayloadMax + kCrcBytes <= kFrameBytesMax, "");
 
 // Makes a frame of two parts in one pass, CRC and delimiter included: what is published may be on
-// the line while the rest is still to come. Returns the bytes on the wire.
+// the line while the rest is still to come. Returns the sink's index after it.
 template <typename Sink>
-uint8_t encode_frame(Sink sink, const uint8_t* part, uint8_t size, const uint8_t* next_part,
+uint8_t encode_frame(Sink sink, uint8_t first, const uint8_t* part, uint8_t size, const uint8_t* next_part,
                      uint8_t next_size) {
-  CobsEncoder cobs;
+  CobsEncoder cobs(first);
   Crc32c crc;
   for (;;) {
-    for (; size != 0; --size) {
+    while (size != 0) {
+      --size;
       const uint8_t byte = *part++;
       crc.add(byte);
       cobs.push(byte, sink);
     }
-    if (next_size == 0)
+    if (next_part == nullptr)
       break;
     part = next_part;
     size = next_size;
-    next_size = 0;
+    next_part = nullptr;
   }
   uint32_t value = crc.value();
   for (uint8_t i = 0; i < kCrcBytes; ++i) {
     cobs.push(static_cast<uint8_t>(value), sink);
     value >>= 8;
   }
-  const uint8_t stuffed = cobs.finish(sink);
-  sink.stage(stuffed, 0);
-  sink.publish(stuffed + 1);
-  return stuffed + 1;
+  const uint8_t delimiter = cobs.finish(sink);
+  sink.stage(delimiter, 0);
+  const uint8_t end = static_cast<uint8_t>(delimiter + 1);
+  sink.publish(end);
+  return end;
 }
 
 // The `size` bytes of header and payload in `frame` as they go over the wire, delimiter included.
