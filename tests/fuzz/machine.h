@@ -54,6 +54,10 @@ class Machine final : public HostHal {
     count_call();
     return HostHal::now();
   }
+  uint32_t frame() override {
+    count_call();
+    return HostHal::frame();
+  }
   uint32_t set_pulses(const Pulses& pulses, uint8_t attached) override {
     count_call();
     const uint8_t calls = calls_to_edge_;

@@ -25,12 +25,9 @@ Cell look_up(Mode mode, Event event) {
 void Board::poll() {
   if (!started_)
     start();
-  const BoardTime now = hal_.now();
-  if (now.frame != now_.frame) {
-    begin_frame(now);
-  } else {
-    now_ = now;
-  }
+  const uint32_t frame = hal_.frame();
+  if (frame != frame_)
+    begin_frame(frame);
   watch_stop_switch();
   read_sensor();
   if (sample_goes_first())
@@ -38,7 +35,7 @@ void Board::poll() {
   receive();
   // Only at rest: a servo's current may pull the supply down in the middle of a byte.
   if (mode_ == Mode::kRelaxed && store_.step(limits_.in_force()))
-    status_wanted_ = true;
+    want(kStatus);
   report();
 }
 
@@ -46,17 +43,25 @@ void Board::poll() {
 // near the frame's end nothing long is begun while a sample is being fetched. Unless bytes would be
 // lost: the next ones need room until the frame has begun.
 bool Board::sample_goes_first() {
-  constexpr uint16_t kNearUs = 1000;
+  constexpr uint16_t kNearUs = 800;
   constexpr uint8_t kWaitingBytes = 72;
-  return now_.phase_us > protocol::kServoFrameUs - kNearUs && hal_.sample_on_its_way() &&
-         hal_.received().size() < kWaitingBytes;
+  return hal_.sample_on_its_way() && hal_.received().size() < kWaitingBytes &&
+         hal_.frame_ends_within(kNearUs);
+}
+
+// In the frame that the board is in, even where the next one has begun.
+BoardTime Board::now() {
+  const BoardTime now = hal_.now();
+  if (now.frame == frame_)
+    return now;
+  return {frame_, protocol::kServoFrameUs - 1};
 }
 
 void Board::start() {
   started_ = true;
-  now_ = hal_.now();
-  idle_since_frame_ = now_.frame;
-  sampled_frame_ = now_.frame;
+  frame_ = hal_.frame();
+  idle_since_frame_ = frame_;
+  sampled_frame_ = frame_;
   Retained& retained = hal_.retained();
   trip_.begin(retained.trip);
   fault_.begin(retained.fault);
@@ -93,8 +98,8 @@ void Board::start_limits() {
     fault(protocol::Fault::kInternal, 0);
 }
 
-void Board::begin_frame(const BoardTime& now) {
-  latch_frame(now);
+void Board::begin_frame(uint32_t frame) {
+  latch_frame(frame);
   check_consistency();
   watch_supply();
   if (detector_.deadline_passed())
@@ -104,8 +109,8 @@ void Board::begin_frame(const BoardTime& now) {
   put_out(current_);
 }
 
-void Board::latch_frame(const BoardTime& now) {
-  now_ = now;
+void Board::latch_frame(uint32_t frame) {
+  frame_ = frame;
   current_ = next_;
   current_attached_ = attached_;
   history_.add(current_);
@@ -123,9 +128,10 @@ void Board::latch_frame(const BoardTime& now) {
   trip_.on_frame();
   fault_.on_frame();
   refusal_.on_frame();
-  telemetry_wanted_ = session_.open();
+  if (session_.open())
+    want(kTelemetry);
   if (++status_age_frames_ >= protocol::kStatusFrames)
-    status_wanted_ = true;
+    want(kStatus);
 }
 
 // From the pulses of this frame to those of the next.
@@ -140,7 +146,7 @@ void Board::advance_motion() {
     case Mode::kPlaying:
       if (!player_.step(next_)) {
         ran_dry_ = true;
-        ran_dry_frame_ = now_.frame;
+        ran_dry_frame_ = frame_;
         raise(Event::kQueueEmpty);
         end_motion();
       }
@@ -168,11 +174,11 @@ void Board::advance_motion() {
 
 void Board::watch_hold_timeout() {
   if (mode_ != Mode::kHolding)
-    idle_since_frame_ = now_.frame;
+    idle_since_frame_ = frame_;
   const uint32_t timeout_frames = limits_.hold_timeout_frames();
   if (timeout_frames == 0)
     return;
-  if (now_.frame - idle_since_frame_ < timeout_frames)
+  if (frame_ - idle_since_frame_ < timeout_frames)
     return;
   raise(Event::kHoldTimeout);
   drop_plans();
@@ -185,12 +191,13 @@ void Board::put_out(const Pulses& set_before) {
   if (attached_ == kAllServos && current_attached_ == kAllServos) {
     limits_.confine(current_, next_);
   }
-  if (hal_.set_pulses(next_, attached_) == now_.frame)
+  const uint32_t running = hal_.set_pulses(next_, attached_);
+  if (running == frame_)
     return;
   // The loop was late: another frame has begun, with what was set before.
   const Pulses planned = next_;
   next_ = set_before;
-  latch_frame(hal_.now());
+  latch_frame(running);
   next_ = planned;
 }
 
@@ -240,15 +247,16 @@ void Board::play_if_ready() {
 
 void Board::freeze() {
   // A frame may have begun since this poll did; its pulses are the ones to stay at.
-  const BoardTime now = hal_.now();
-  if (now.frame != now_.frame)
-    latch_frame(now);
+  const uint32_t frame = hal_.frame();
+  if (frame != frame_)
+    latch_frame(frame);
   const Pulses planned = next_;
   next_ = current_;
-  if (hal_.set_pulses(next_, attached_) != now_.frame) {
+  const uint32_t running = hal_.set_pulses(next_, attached_);
+  if (running != frame_) {
     // One has begun just now, with what was planned: then that is where to stay.
     next_ = planned;
-    latch_frame(hal_.now());
+    latch_frame(running);
     hal_.set_pulses(next_, attached_);
   }
   end_motion();

@@ -55,14 +55,15 @@ class Board {
   SETAE_OWN_FRAME void start();
   SETAE_OWN_FRAME void start_limits();
   bool sample_goes_first();
-  SETAE_OWN_FRAME void begin_frame(const BoardTime& now);
+  BoardTime now();
+  SETAE_OWN_FRAME void begin_frame(uint32_t frame);
   void advance_motion();
   void watch_hold_timeout();
   void put_out(const Pulses& set_before);
   void check_consistency();
 
   // Makes the pulses last set those of this frame.
-  void latch_frame(const BoardTime& now);
+  void latch_frame(uint32_t frame);
 
   // What the state table says to an event.
   Verdict ask(Event event) const;
@@ -80,6 +81,7 @@ class Board {
 
   // ---- commands.cpp: the host ----
   void receive();
+  bool take_received();
   SETAE_OWN_FRAME void handle_message();
   SETAE_OWN_FRAME void handle_hello();
   void handle_stop();
@@ -117,7 +119,19 @@ class Board {
   bool record_pending() const { return trip_.pending() || fault_.pending(); }
 
   // ---- reports.cpp: what the host gets to know ----
+  // The first goes first.
+  enum Report : uint8_t {
+    kTelemetry = 1 << 0,
+    kReceipt = 1 << 1,
+    kHelloReply = 1 << 2,
+    kPong = 1 << 3,
+    kLimits = 1 << 4,
+    kStatus = 1 << 5,
+  };
+  void want(Report report) { wanted_ |= report; }
   void report();
+  bool send(Report report);
+  SETAE_OWN_FRAME bool send_receipt();
   SETAE_OWN_FRAME bool send_hello_reply();
   SETAE_OWN_FRAME bool send_limits();
   SETAE_OWN_FRAME bool send_pong();
@@ -139,7 +153,7 @@ class Board {
 
   // Time and motion.
   bool started_ = false;
-  BoardTime now_ = {};
+  uint32_t frame_ = 0;
   Mode mode_ = Mode::kRelaxed;
   uint8_t epoch_ = 0;
   Pulses current_ = {};  // put out in this frame
@@ -178,13 +192,8 @@ class Board {
   uint8_t stop_session_ = 0;
   uint32_t hello_token_ = 0;
   uint32_t ping_token_ = 0;
-  bool hello_wanted_ = false;
-  bool receipt_wanted_ = false;
+  uint8_t wanted_ = 0;  // a bit for each Report
   bool gap_ = false;
-  bool pong_wanted_ = false;
-  bool limits_wanted_ = false;
-  bool telemetry_wanted_ = false;
-  bool status_wanted_ = false;
   uint8_t status_age_frames_ = 0;
 
   Latch<protocol::Trip> trip_;

@@ -9,19 +9,37 @@ using protocol::Refusal;
 
 namespace {
 
-// Less is left until it is more, unless it ends a frame: each turn costs as much as three bytes.
-constexpr uint8_t kBytesAtATime = 12;
+// Each look at what has come costs as much as six bytes. So many are worth one under load.
+constexpr uint8_t kBytesAtATime = 32;
+// Of a new frame some are taken soon, so that a short one is all but done when it ends.
+constexpr uint8_t kFirstBytes = 6;
+// A stop is to reach the next frame even if it comes just before it.
+constexpr uint16_t kAlertUs = 1300;
 // Segments that come this soon after the queue ran dry were meant to come before.
 constexpr uint8_t kUnderrunFrames = 5;
 
 }  // namespace
 
 void Board::receive() {
+  const ReceiveRing& ring = hal_.received();
+  const uint8_t waiting = ring.size();
+  if (waiting < kBytesAtATime) {
+    if (!ring.ended && (receiver_.inside() || waiting < kFirstBytes))
+      return;
+    // While the line is busy nobody could be answered: let it become more.
+    if (!transmitter_.ready() && !hal_.frame_ends_within(kAlertUs))
+      return;
+  }
+  // And not what comes meanwhile, byte by byte, unless it ends a frame.
+  if (take_received() && ring.ended)
+    take_received();
+}
+
+// False where something is more urgent than what is left.
+bool Board::take_received() {
   ReceiveRing& ring = hal_.received();
-  if (!ring.ended && ring.size() < kBytesAtATime)
-    return;
   ring.ended = false;
-  uint8_t left = ring.size();  // and not what comes meanwhile, byte by byte
+  uint8_t left = ring.size();
   while (left != 0) {
     uint8_t count = ring.front_size();
     if (count > left)
@@ -35,10 +53,11 @@ void Board::receive() {
       report();
       if (sample_goes_first()) {
         ring.ended = true;
-        return;
+        return false;
       }
     }
   }
+  return true;
 }
 
 void Board::handle_message() {
@@ -50,14 +69,14 @@ void Board::handle_message() {
     return handle_hello();
   if (from.session != session_.id())
     return receiver_.count_stray();
-  idle_since_frame_ = now_.frame;
+  idle_since_frame_ = frame_;
 
   switch (receiver_.type()) {
     case MessageType::kPing: {
       protocol::Ping ping;
       decode(receiver_.payload(), ping);
       ping_token_ = ping.token;
-      pong_wanted_ = true;
+      want(kPong);
       return;
     }
     case MessageType::kRecall: {
@@ -91,7 +110,7 @@ void Board::handle_message() {
       return;
     }
     case MessageType::kReadLimits:
-      limits_wanted_ = true;
+      want(kLimits);
       return;
     default:
       return handle_reliable();
@@ -102,7 +121,7 @@ void Board::handle_hello() {
   protocol::Hello hello;
   decode(receiver_.payload(), hello);
   hello_token_ = hello.token;
-  hello_wanted_ = true;
+  want(kHelloReply);
   if (hello.new_session == 0 || hello.new_session == session_.id())
     return;
   // A host of another version learns it from the answer, and moves nothing.
@@ -111,10 +130,10 @@ void Board::handle_hello() {
     return;
   }
   session_.start(hello.new_session);
-  idle_since_frame_ = now_.frame;
+  idle_since_frame_ = frame_;
   stop_known_ = false;
-  status_wanted_ = true;
-  receipt_wanted_ = false;
+  want(kStatus);
+  wanted_ &= static_cast<uint8_t>(~kReceipt);
   gap_ = false;
   if (mode_ == Mode::kPlaying || mode_ == Mode::kUnwinding) {
     freeze();
@@ -127,7 +146,7 @@ void Board::handle_hello() {
 void Board::handle_stop() {
   protocol::Stop stop;
   decode(receiver_.payload(), stop);
-  receipt_wanted_ = true;
+  want(kReceipt);
   const uint8_t session = receiver_.header().session;
   if (stop_known_ && stop.stop_number == stop_number_ && session == stop_session_)
     return;
@@ -139,7 +158,7 @@ void Board::handle_stop() {
 }
 
 void Board::handle_reliable() {
-  receipt_wanted_ = true;
+  want(kReceipt);
   switch (session_.judge(receiver_.header().sequence)) {
     case Session::Order::kNext:
       if (carry_out())
@@ -296,7 +315,7 @@ Verdict Board::segments() {
   if (message.count > player_.room())
     return Verdict::wait();
 
-  if (ran_dry_ && now_.frame - ran_dry_frame_ <= kUnderrunFrames)
+  if (ran_dry_ && frame_ - ran_dry_frame_ <= kUnderrunFrames)
     ++underruns_;
   ran_dry_ = false;
   for (uint8_t i = 0; i < message.count; ++i)

@@ -11,6 +11,9 @@ namespace {
 
 // What comes while a frame begins and a report is made finds room beside so many.
 constexpr uint8_t kReceivedFirstBytes = 48;
+// Writing a message takes up to 0.35 ms, and a stop is to reach the next frame even if it comes
+// just before it. What is written already lasts the line until then.
+constexpr uint16_t kQuietUs = 500;
 
 }  // namespace
 
@@ -19,42 +22,44 @@ constexpr uint8_t kReceivedFirstBytes = 48;
 // What the board sends by itself goes first, for the same reason: records and telemetry come at
 // their own pace, answers as fast as they are asked for.
 void Board::report() {
-  // Answers can wait; bytes that find no room are lost.
-  if (hal_.received().size() > kReceivedFirstBytes || !transmitter_.ready())
+  if (!transmitter_.ready())
     return;
-  if (!send_latched(trip_) || !send_latched(fault_) || !send_latched(refusal_))
-    return;
-  const bool frame_began = telemetry_wanted_;
-  if (telemetry_wanted_) {
-    if (!send_telemetry())
-      return;
-    telemetry_wanted_ = false;
-  }
-  if (receipt_wanted_) {
-    const protocol::Receipt receipt = {gap_};
-    if (!transmitter_.send(header(), receipt))
-      return;
-    receipt_wanted_ = gap_ = false;
-  }
-  if (hello_wanted_) {
-    if (!send_hello_reply())
-      return;
-    hello_wanted_ = false;
-  }
-  if (pong_wanted_) {
-    if (!send_pong())
-      return;
-    pong_wanted_ = false;
-  }
-  if (limits_wanted_) {
-    if (!send_limits())
-      return;
-    limits_wanted_ = false;
-  }
+  const bool open = session_.open();
+  uint8_t wanted = wanted_;
   // The poll in which a frame begins is the longest already.
-  if (status_wanted_ && !frame_began && session_.open() && send_status()) {
-    status_wanted_ = false;
-    status_age_frames_ = 0;
+  if (!open || (wanted & kTelemetry) != 0)
+    wanted &= static_cast<uint8_t>(~kStatus);
+  const bool record = trip_.wanted(open) || fault_.wanted(open) || refusal_.wanted(open);
+  if (wanted == 0 && !record)
+    return;
+  // Answers can wait; bytes that find no room are lost.
+  if (hal_.received().size() > kReceivedFirstBytes || hal_.frame_ends_within(kQuietUs))
+    return;
+  if (record && (!send_latched(trip_) || !send_latched(fault_) || !send_latched(refusal_)))
+    return;
+  for (uint8_t report = 1; report <= wanted && report != 0; report <<= 1) {
+    if ((wanted & report) == 0)
+      continue;
+    if (!send(static_cast<Report>(report)))
+      return;
+    wanted_ &= static_cast<uint8_t>(~report);
+  }
+}
+
+bool Board::send(Report report) {
+  switch (report) {
+    case kTelemetry:
+      return send_telemetry();
+    case kReceipt:
+      return send_receipt();
+    case kHelloReply:
+      return send_hello_reply();
+    case kPong:
+      return send_pong();
+    case kLimits:
+      return send_limits();
+    default:
+      return send_status();
   }
 }
 
@@ -79,6 +84,14 @@ protocol::BoardHeader Board::header() const {
   if (refusal_.pending())
     header.state |= protocol::kRefusalWaits;
   return header;
+}
+
+bool Board::send_receipt() {
+  const protocol::Receipt receipt = {gap_};
+  if (!transmitter_.send(header(), receipt))
+    return false;
+  gap_ = false;
+  return true;
 }
 
 bool Board::send_hello_reply() {
@@ -114,9 +127,10 @@ bool Board::send_pong() {
 }
 
 bool Board::send_telemetry() {
+  const BoardTime time = now();
   protocol::Telemetry telemetry = {};
-  telemetry.frame = now_.frame;
-  telemetry.phase_us = now_.phase_us;
+  telemetry.frame = time.frame;
+  telemetry.phase_us = time.phase_us;
   for (uint8_t i = 0; i < protocol::kServos; ++i) {
     telemetry.pulse_ticks[i] = current_.ticks[i];
   }
@@ -129,7 +143,7 @@ bool Board::send_telemetry() {
   telemetry.sample_count = samples_.size();
   for (uint8_t i = 0; i < samples_.size(); ++i) {
     telemetry.samples[i].pressure_raw = samples_[i].pressure_raw;
-    telemetry.samples[i].age_us = age_us(samples_[i].sampled, now_);
+    telemetry.samples[i].age_us = age_us(samples_[i].sampled, time);
   }
   telemetry.rx_damaged = receiver_.damaged();
   telemetry.stop_number = stop_number_;
@@ -151,7 +165,10 @@ bool Board::send_status() {
   status.rx_overruns = errors.overrun;
   status.rx_overflows = errors.dropped;
   status.late_pulses = hal_.late_pulses();
-  return transmitter_.send(header(), status);
+  if (!transmitter_.send(header(), status))
+    return false;
+  status_age_frames_ = 0;
+  return true;
 }
 
 }  // namespace setae

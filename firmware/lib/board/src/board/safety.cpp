@@ -35,7 +35,7 @@ void Board::read_sensor() {
     sensor_ = reading.status;
   } else if (judged_ != Sensor::kOk) {
     sensor_ = judged_;
-  } else if (now_.frame - sampled_frame_ > protocol::kSensorSilentFrames && !reading.fresh) {
+  } else if (frame_ - sampled_frame_ > protocol::kSensorSilentFrames && !reading.fresh) {
     sensor_ = Sensor::kSilent;
   } else {
     sensor_ = Sensor::kOk;
@@ -47,7 +47,7 @@ void Board::read_sensor() {
     return;
   switch (detector_.guard()) {
     case Guard::kArmed:
-      fault(fault_of(sensor_), now_.frame - sampled_frame_);
+      fault(fault_of(sensor_), frame_ - sampled_frame_);
       break;
     case Guard::kTaring:
       refuse_tare(Refusal::kSensorUnavailable, static_cast<uint8_t>(sensor_), 0);
@@ -59,7 +59,7 @@ void Board::read_sensor() {
 
 void Board::take_sample(const SensorReading& reading) {
   sampled_ = reading.sampled;
-  sampled_frame_ = now_.frame;
+  sampled_frame_ = frame_;
   samples_.add(reading.pressure_raw, reading.sampled);
   switch (detector_.take(reading.pressure_raw, rest_follow())) {
     case Finding::kContact:
@@ -159,8 +159,9 @@ void Board::fault(Fault fault, uint32_t detail) {
   protocol::FaultMessage record = {};
   record.fault = static_cast<uint8_t>(fault);
   record.detail = detail;
-  record.frame = now_.frame;
-  record.phase_us = now_.phase_us;
+  const BoardTime time = now();
+  record.frame = time.frame;
+  record.phase_us = time.phase_us;
   for (uint8_t i = 0; i < protocol::kServos; ++i)
     record.pulse_ticks[i] = current_.ticks[i];
   fault_.set(record, session_.id());

@@ -46,6 +46,8 @@ struct LineErrors {
 class Hal {
  public:
   SETAE_ASK BoardTime now() SETAE_ANSWER;
+  SETAE_ASK uint32_t frame() SETAE_ANSWER;
+  SETAE_ASK bool frame_ends_within(uint16_t us) SETAE_ANSWER;
 
   // Serial line: what has come, and what is to go. The board reads the one and writes the other.
   SETAE_ASK ReceiveRing& received() SETAE_ANSWER;

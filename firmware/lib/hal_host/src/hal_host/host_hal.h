@@ -58,6 +58,10 @@ class HostHal : public Hal {
   // ---- Hal ----
 
   BoardTime now() override { return to_board_time(board_us_); }
+  uint32_t frame() override { return to_board_time(board_us_).frame; }
+  bool frame_ends_within(uint16_t us) override {
+    return to_board_time(board_us_).phase_us >= protocol::kServoFrameUs - us;
+  }
   ReceiveRing& received() override { return receive_; }
   TransmitRing& to_send() override { return transmit_; }
   void start_sending() override {}

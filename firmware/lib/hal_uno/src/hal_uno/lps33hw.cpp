@@ -84,37 +84,37 @@ void Lps33hw::fetch(bool by_timer) {
   twi_.go();
 }
 
-SensorReading Lps33hw::poll(const BoardTime& now) {
-  SensorReading reading = {status_, false, 0, now};
+SensorReading Lps33hw::poll() {
+  SensorReading reading = {status_, false, 0, {0, 0}};
   switch (twi_.poll()) {
     case Twi::Result::kBusy:
       break;
     case Twi::Result::kNoAck:
       address_ ^= 1;
-      fail(Sensor::kAbsent, now);
+      fail(Sensor::kAbsent);
       break;
     case Twi::Result::kFailed:
-      fail(Sensor::kBus, now);
+      fail(Sensor::kBus);
       break;
     case Twi::Result::kIdle:
-      if (step_ == Step::kPause && now.frame - since_frame_ >= kRetryFrames) {
+      if (step_ == Step::kPause && servo_pulses::frame_number() - since_frame_ >= kRetryFrames) {
         step_ = Step::kIdentify;
         twi_.start_read(address_, kWhoAmI, 1);
       }
       break;
     case Twi::Result::kDone:
-      on_done(now, reading);
+      on_done(reading);
       break;
   }
   reading.status = status_;
   return reading;
 }
 
-void Lps33hw::on_done(const BoardTime& now, SensorReading& reading) {
+void Lps33hw::on_done(SensorReading& reading) {
   switch (step_) {
     case Step::kIdentify:
       if (twi_.data()[0] != kIdentity)
-        return fail(Sensor::kWrong, now);
+        return fail(Sensor::kWrong);
       step_ = Step::kReset;
       return twi_.start_write(address_, kCtrlReg2, kSoftwareReset | kAutoIncrement);
     case Step::kReset:
@@ -130,17 +130,17 @@ void Lps33hw::on_done(const BoardTime& now, SensorReading& reading) {
       status_ = Sensor::kOk;
       step_ = Step::kRun;
       running_ = true;
-      since_frame_ = now.frame;
+      since_frame_ = servo_pulses::frame_number();
       wait_ = kEarliestWait;
       return expect_next(0);
     case Step::kRun:
-      return take_sample(now, reading);
+      return take_sample(reading);
     default:
-      return fail(Sensor::kBus, now);
+      return fail(Sensor::kBus);
   }
 }
 
-void Lps33hw::take_sample(const BoardTime& now, SensorReading& reading) {
+void Lps33hw::take_sample(SensorReading& reading) {
   const uint8_t* data = twi_.data();
   const uint16_t begun_ticks = twi_.begun_ticks();
   if (twi_.found()) {
@@ -149,13 +149,13 @@ void Lps33hw::take_sample(const BoardTime& now, SensorReading& reading) {
     reading.fresh = true;
     reading.pressure_raw = static_cast<int32_t>(raw << 8) / 256;  // sign of 24 bits
     reading.sampled = servo_pulses::at(static_cast<uint16_t>(begun_ticks + kStatusTicks));
-    since_frame_ = now.frame;
+    since_frame_ = servo_pulses::frame_number();
     if (by_timer_)
       follow(twi_.misses());
     return expect_next(static_cast<uint16_t>(servo_pulses::ticks() - begun_ticks));
   }
-  if (now.frame - since_frame_ > kSilentFrames)
-    return fail(Sensor::kSilent, now);
+  if (servo_pulses::frame_number() - since_frame_ > kSilentFrames)
+    return fail(Sensor::kSilent);
   expect_next(0xFFFF);  // at once: it is overdue
 }
 
@@ -192,12 +192,12 @@ void Lps33hw::expect_next(uint16_t elapsed_ticks) {
   start_timer(elapsed < wait ? static_cast<uint16_t>(wait - elapsed) : 1);
 }
 
-void Lps33hw::fail(Sensor status, const BoardTime& now) {
+void Lps33hw::fail(Sensor status) {
   stop_handlers();
   running_ = false;
   status_ = status;
   step_ = Step::kPause;
-  since_frame_ = now.frame;
+  since_frame_ = servo_pulses::frame_number();
 }
 
 }  // namespace setae

@@ -17,7 +17,7 @@ class Lps33hw {
   void begin();
 
   // Hands out what has come, without waiting.
-  SensorReading poll(const BoardTime& now);
+  SensorReading poll();
 
   // A sample is about to come, or on its way.
   bool fetching() const { return running_ && twi_.busy(); }
@@ -36,11 +36,11 @@ class Lps33hw {
     kRun,
   };
 
-  void on_done(const BoardTime& now, SensorReading& reading);
-  void take_sample(const BoardTime& now, SensorReading& reading);
+  void on_done(SensorReading& reading);
+  void take_sample(SensorReading& reading);
   void follow(uint8_t misses);
   void expect_next(uint16_t elapsed_ticks);
-  void fail(protocol::Sensor status, const BoardTime& now);
+  void fail(protocol::Sensor status);
 
   Twi twi_;
   Step step_ = Step::kPause;

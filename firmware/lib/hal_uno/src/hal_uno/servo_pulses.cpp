@@ -155,6 +155,22 @@ BoardTime now() {
   return time;
 }
 
+uint32_t frame_number() {
+  uint32_t number;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    number = frame;
+  }
+  return number;
+}
+
+bool frame_ends_within(uint16_t us) {
+  uint16_t elapsed;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    elapsed = TCNT1 - frame_start;
+  }
+  return elapsed >= kFrameTicks - us * protocol::kPulseTicksPerUs;
+}
+
 BoardTime at(uint16_t then) {
   BoardTime time = now();
   const uint16_t ago_us = static_cast<uint16_t>(ticks() - then) / protocol::kPulseTicksPerUs;

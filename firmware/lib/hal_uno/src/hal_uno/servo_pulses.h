@@ -19,6 +19,8 @@ uint32_t set(const Pulses& pulses, uint8_t attached);
 void detach_from_interrupt();
 
 BoardTime now();
+uint32_t frame_number();
+bool frame_ends_within(uint16_t us);
 // Edges that could not be armed in time, since start, modulo 256: none, unless interrupts are off
 // for longer than they ever should be.
 uint8_t late_armings();

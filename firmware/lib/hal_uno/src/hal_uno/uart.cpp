@@ -36,10 +36,6 @@ TransmitRing& to_send() {
   return ring_out;
 }
 
-void start_sending() {
-  UCSR0B |= _BV(UDRIE0);
-}
-
 LineErrors errors() {
   LineErrors copy;
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {

@@ -1,6 +1,7 @@
 // The serial line to the host. Both directions run on interrupts through rings of their own.
 #pragma once
 
+#include <avr/io.h>
 #include <stdint.h>
 
 #include "hal/hal.h"
@@ -11,7 +12,9 @@ namespace uart {
 void begin();
 ReceiveRing& received();
 TransmitRing& to_send();
-void start_sending();
+inline void start_sending() {
+  UCSR0B |= _BV(UDRIE0);
+}
 LineErrors errors();
 
 // When the frame that was read last had come, in servo_pulses::ticks(). False where more has come

@@ -54,6 +54,14 @@ BoardTime Hal::now() {
   return servo_pulses::now();
 }
 
+uint32_t Hal::frame() {
+  return servo_pulses::frame_number();
+}
+
+bool Hal::frame_ends_within(uint16_t us) {
+  return servo_pulses::frame_ends_within(us);
+}
+
 ReceiveRing& Hal::received() {
   return uart::received();
 }
@@ -75,7 +83,7 @@ uint32_t Hal::set_pulses(const Pulses& pulses, uint8_t attached) {
 }
 
 SensorReading Hal::read_sensor() {
-  return sensor.poll(servo_pulses::now());
+  return sensor.poll();
 }
 
 bool Hal::sample_on_its_way() {

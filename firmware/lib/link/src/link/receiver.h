@@ -24,6 +24,8 @@ class Receiver {
   protocol::MessageType type() const { return static_cast<protocol::MessageType>(header_.type); }
   const uint8_t* payload() const { return decoder_.data() + protocol::HostHeader::kSize; }
 
+  // A frame has begun.
+  bool inside() const { return decoder_.inside(); }
   uint8_t damaged() const { return decoder_.damaged(); }
   // The message came from another session.
   void count_stray() { decoder_.count_damaged(); }

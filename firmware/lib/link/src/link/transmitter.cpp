@@ -21,7 +21,7 @@ class LineSink {
 
 }  // namespace
 
-bool Transmitter::send_bytes(protocol::BoardHeader header, protocol::MessageType type,
+bool Transmitter::send_bytes(protocol::BoardHeader& header, protocol::MessageType type,
                              const uint8_t* payload, uint8_t size) {
   if (!ready())
     return false;

@@ -23,19 +23,18 @@ class Transmitter {
 
   // Fills in the header's type and sequence. False where too much waits before it.
   template <typename Message>
-  bool send(const protocol::BoardHeader& header, const Message& message) {
-    return send_as(Message::kType, header, message);
+  bool send(protocol::BoardHeader&& header, const Message& message) {
+    return send_as(Message::kType, static_cast<protocol::BoardHeader&&>(header), message);
   }
   // Under another message's type, whose payload is the same.
   template <typename Message>
-  bool send_as(protocol::MessageType type, const protocol::BoardHeader& header,
-               const Message& message) {
+  bool send_as(protocol::MessageType type, protocol::BoardHeader&& header, const Message& message) {
     protocol::Wire<Message> wire(message);
     return send_bytes(header, type, wire.bytes(), Message::kSize);
   }
 
  private:
-  bool send_bytes(protocol::BoardHeader header, protocol::MessageType type, const uint8_t* payload,
+  bool send_bytes(protocol::BoardHeader& header, protocol::MessageType type, const uint8_t* payload,
                   uint8_t size);
 
   HalRef hal_;

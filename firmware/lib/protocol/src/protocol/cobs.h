@@ -16,8 +16,7 @@ namespace protocol {
 class CobsEncoder {
  public:
   // The sink's index of the first byte; indices wrap at 256.
-  explicit CobsEncoder(uint8_t first = 0)
-      : at_(static_cast<uint8_t>(first + 1)), code_at_(first) {}
+  explicit CobsEncoder(uint8_t first = 0) : at_(static_cast<uint8_t>(first + 1)), code_at_(first) {}
 
   template <typename Sink>
   SETAE_HOT void push(uint8_t byte, Sink& sink) {

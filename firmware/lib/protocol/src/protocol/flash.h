@@ -17,6 +17,16 @@
 namespace setae {
 namespace protocol {
 
+SETAE_HOT uint8_t next_byte(const uint8_t*& from) {
+#ifdef __AVR__
+  uint8_t byte;
+  asm volatile("ld %0, %a1+" : "=r"(byte), "+x"(from));
+  return byte;
+#else
+  return *from++;
+#endif
+}
+
 inline uint8_t flash_read(const uint8_t* address) {
 #ifdef __AVR__
   return pgm_read_byte(address);

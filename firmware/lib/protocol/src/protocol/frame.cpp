@@ -33,13 +33,16 @@ uint8_t FrameDecoder::take(const uint8_t* wire, uint8_t count, bool& good) {
     // Most bytes are in the middle of a run: for so many there is nothing but a zero to look for.
     const uint8_t most = smallest(left, smallest(room, cobs.left()));
     uint8_t run = most;
-    for (; run != 0; --run) {
-      const uint8_t byte = *wire;
-      if (byte == 0)
-        break;
-      ++wire;
-      *out++ = byte;
-      crc.add(byte);
+    if (run != 0) {
+      do {
+        const uint8_t byte = next_byte(wire);
+        if (byte == 0) {
+          --wire;
+          break;
+        }
+        *out++ = byte;
+        crc.add(byte);
+      } while (--run != 0);
     }
     const uint8_t moved = static_cast<uint8_t>(most - run);
     cobs.skip(moved);
