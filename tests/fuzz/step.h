@@ -29,7 +29,7 @@ struct BoardProbe {
   static Snapshot look(const Board& board) {
     Snapshot shot = {};
     shot.mode = board.mode_;
-    shot.frame = board.now_.frame;
+    shot.frame = board.frame_;
     shot.epoch = board.epoch_;
     shot.session = board.session_.id();
     shot.expected = board.session_.expected();

@@ -21,8 +21,22 @@ Pulses pulses_of(uint16_t a, uint16_t b, uint16_t c, uint16_t d) {
 
 Limits default_limits() {
   Limits limits;
-  limits.set(kDefaultLimits);
+  Verdict verdict;
+  limits.set(kDefaultLimits, verdict);
   return limits;
+}
+
+Verdict pose_verdict(const Limits& limits, const Pulses& pose) {
+  Verdict verdict;
+  CHECK(limits.check_pose(pose.ticks, verdict) == verdict.ok());
+  return verdict;
+}
+
+Verdict line_verdict(const Limits& limits, const Pulses& from, const Pulses& to, uint16_t frames,
+                     uint8_t index) {
+  Verdict verdict;
+  CHECK(limits.check_line(from.ticks, to.ticks, frames, index, verdict) == verdict.ok());
+  return verdict;
 }
 
 // What is wrong with a played line, in words; empty where nothing is.
@@ -170,8 +184,9 @@ TEST_CASE("servos attach one at a time") {
 
 TEST_CASE("the built-in limits are consistent, and allow the free pose") {
   Limits limits;
-  CHECK(limits.set(kDefaultLimits).ok());
-  CHECK(limits.check_pose(pulses_of(1700, 1700, 1700, 1700).ticks).ok());
+  Verdict verdict;
+  CHECK(limits.set(kDefaultLimits, verdict));
+  CHECK(pose_verdict(limits, pulses_of(1700, 1700, 1700, 1700)).ok());
 }
 
 TEST_CASE("each servo's range is checked, at its ends too") {
@@ -180,33 +195,33 @@ TEST_CASE("each servo's range is checked, at its ends too") {
   for (uint8_t i = 0; i < 4; ++i) {
     pose = pulses_of(2000, 2000, 2000, 2000);
     pose.ticks[i] = kDefaultLimits.pulse_min_ticks[i] - 1;
-    const Verdict low = limits.check_pose(pose.ticks);
+    const Verdict low = pose_verdict(limits, pose);
     CHECK(low.reason == Refusal::kOutOfLimits);
     CHECK(low.index == i);
     CHECK(low.value == pose.ticks[i]);
     CHECK(low.limit == kDefaultLimits.pulse_min_ticks[i]);
     pose.ticks[i] = kDefaultLimits.pulse_max_ticks[i] + 1;
-    CHECK(limits.check_pose(pose.ticks).limit == kDefaultLimits.pulse_max_ticks[i]);
+    CHECK(pose_verdict(limits, pose).limit == kDefaultLimits.pulse_max_ticks[i]);
     pose.ticks[i] = 65535;
-    CHECK(limits.check_pose(pose.ticks).reason == Refusal::kOutOfLimits);
+    CHECK(pose_verdict(limits, pose).reason == Refusal::kOutOfLimits);
   }
 }
 
 TEST_CASE("opposite tendons are checked together though each is in range") {
   const Limits limits = default_limits();
   const uint16_t high = kDefaultLimits.pulse_max_ticks[0] - 1;  // both wound up: crushes
-  const Verdict crushed = limits.check_pose(pulses_of(high, 2000, high, 2000).ticks);
+  const Verdict crushed = pose_verdict(limits, pulses_of(high, 2000, high, 2000));
   CHECK(crushed.reason == Refusal::kPairLimit);
   CHECK(crushed.index == 0);
   CHECK(crushed.value == 2 * high);
   CHECK(crushed.limit == kDefaultLimits.pair_sum_max_ticks[0]);
 
   const uint16_t apart = kDefaultLimits.pair_difference_max_ticks[1] + 1;  // bends too far
-  const Verdict bent = limits.check_pose(pulses_of(2000, 1700 + apart, 2000, 1700).ticks);
+  const Verdict bent = pose_verdict(limits, pulses_of(2000, 1700 + apart, 2000, 1700));
   CHECK(bent.reason == Refusal::kPairLimit);
   CHECK(bent.index == 1);
   CHECK(bent.value == apart);
-  const Verdict other_way = limits.check_pose(pulses_of(2000, 1700, 2000, 1700 + apart).ticks);
+  const Verdict other_way = pose_verdict(limits, pulses_of(2000, 1700, 2000, 1700 + apart));
   CHECK(other_way.value == -int32_t(apart));
   CHECK(other_way.limit == kDefaultLimits.pair_difference_min_ticks[1]);
 }
@@ -216,14 +231,14 @@ TEST_CASE("a line may be as fast as the slew limit, not faster") {
   const uint16_t slew = kDefaultLimits.slew_ticks;
   const Pulses from = pulses_of(1700, 1700, 1700, 1700);
   const Pulses to = pulses_of(1700, 1700 + 3 * slew, 1700, 1700);
-  CHECK(limits.check_line(from.ticks, to.ticks, 3, 4).ok());
-  const Verdict fast = limits.check_line(from.ticks, to.ticks, 2, 4);
+  CHECK(line_verdict(limits, from, to, 3, 4).ok());
+  const Verdict fast = line_verdict(limits, from, to, 2, 4);
   CHECK(fast.reason == Refusal::kTooFast);
   CHECK(fast.index == 4);
   CHECK(fast.value == 3 * slew);
   CHECK(fast.limit == 2 * slew);
   // 65535 frames at full speed is more than 16 bits.
-  CHECK(limits.check_line(from.ticks, to.ticks, 65535, 0).ok());
+  CHECK(line_verdict(limits, from, to, 65535, 0).ok());
 }
 
 TEST_CASE("limits beyond the compiled-in bounds, or upside down, are refused") {
@@ -231,7 +246,9 @@ TEST_CASE("limits beyond the compiled-in bounds, or upside down, are refused") {
   const auto refused = [&](void (*change)(protocol::SetLimits&)) {
     protocol::SetLimits wanted = kDefaultLimits;
     change(wanted);
-    const Refusal reason = limits.set(wanted).reason;
+    Verdict verdict;
+    limits.set(wanted, verdict);
+    const Refusal reason = verdict.reason;
     CHECK(limits.in_force().slew_ticks == kDefaultLimits.slew_ticks);
     return reason;
   };

@@ -91,10 +91,11 @@ void Board::start() {
 void Board::start_limits() {
   protocol::SetLimits limits;
   // What an older firmware took may be out of this one's bounds.
-  if (store_.load(limits) && limits_.set(limits).ok())
+  Verdict verdict;
+  if (store_.load(limits) && limits_.set(limits, verdict))
     return;
   protocol::flash_copy(&kInitialLimits, limits);
-  if (!limits_.set(limits).ok())
+  if (!limits_.set(limits, verdict))
     fault(protocol::Fault::kInternal, 0);
 }
 
@@ -212,22 +213,22 @@ void Board::check_consistency() {
   }
 }
 
-Verdict Board::ask(Event event) const {
+Refusal Board::ask(Event event) const {
   const Cell cell = look_up(mode_, event);
-  return cell.is_refusal() ? Verdict::refuse(cell.reason()) : Verdict::accept();
+  return cell.is_refusal() ? cell.reason() : Refusal::kNone;
 }
 
-Verdict Board::raise(Event event) {
+Refusal Board::raise(Event event) {
   const Cell cell = look_up(mode_, event);
   if (cell.is_refusal())
-    return Verdict::refuse(cell.reason());
+    return cell.reason();
   if (cell.is_mode()) {
     mode_ = cell.mode();
   } else {
     fault(protocol::Fault::kInternal,
           0x10000UL | static_cast<uint16_t>(mode_) << 8 | static_cast<uint8_t>(event));
   }
-  return Verdict::accept();
+  return Refusal::kNone;
 }
 
 void Board::play_if_ready() {

@@ -65,10 +65,10 @@ class Board {
   // Makes the pulses last set those of this frame.
   void latch_frame(uint32_t frame);
 
-  // What the state table says to an event.
-  Verdict ask(Event event) const;
+  // What the state table says to an event: why it is refused, or kNone.
+  protocol::Refusal ask(Event event) const;
   // The same, and changes the mode unless the event is refused.
-  Verdict raise(Event event);
+  protocol::Refusal raise(Event event);
   SETAE_OWN_FRAME void play_if_ready();
   // The servos stay where they are in this frame, and the plans are dropped.
   void freeze();
@@ -87,18 +87,21 @@ class Board {
   void handle_stop();
   void handle_reliable();
   bool carry_out();
-  Verdict decide();
-  SETAE_OWN_FRAME Verdict enable();
-  Verdict resume();
-  SETAE_OWN_FRAME Verdict relax();
-  Verdict limp();
-  SETAE_OWN_FRAME Verdict segments();
-  SETAE_OWN_FRAME Verdict guard();
-  Verdict disarm();
-  SETAE_OWN_FRAME Verdict set_limits();
-  Verdict store_limits();
-  Verdict check_segments(const protocol::Segments& message) const;
-  Verdict check_guard(const protocol::GuardMessage& message) const;
+  // These are false where the command is not carried out, and say why in `verdict`.
+  bool decide(Verdict& verdict);
+  SETAE_OWN_FRAME bool enable(Verdict& verdict);
+  bool resume(Verdict& verdict);
+  SETAE_OWN_FRAME bool relax(Verdict& verdict);
+  void limp();
+  SETAE_OWN_FRAME bool segments(Verdict& verdict);
+  SETAE_OWN_FRAME bool guard(Verdict& verdict);
+  bool disarm(Verdict& verdict);
+  SETAE_OWN_FRAME bool set_limits(Verdict& verdict);
+  bool store_limits(Verdict& verdict);
+  // Whether the state table allows it.
+  bool allows(Event event, Verdict& verdict) const;
+  bool check_segments(const protocol::Segments& message, Verdict& verdict) const;
+  bool check_guard(const protocol::GuardMessage& message, Verdict& verdict) const;
   // Latches the refusal, and stops the motion where a motion was refused.
   SETAE_OWN_FRAME void refuse(protocol::MessageType type, uint8_t sequence, const Verdict& verdict);
 
@@ -139,7 +142,10 @@ class Board {
   SETAE_OWN_FRAME bool send_status();
   template <typename Record>
   SETAE_OWN_FRAME bool send_latched(Latch<Record>& latch);
-  protocol::BoardHeader header() const;
+  // What each message begins with; the transmitter adds the rest.
+  struct Header : protocol::BoardHeader {
+    explicit Header(const Board& board);
+  };
 
   HalRef hal_;
   Receiver receiver_;

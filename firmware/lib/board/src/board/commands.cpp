@@ -12,7 +12,7 @@ namespace {
 // Each look at what has come costs as much as six bytes. So many are worth one under load.
 constexpr uint8_t kBytesAtATime = 32;
 // Of a new frame some are taken soon, so that a short one is all but done when it ends.
-constexpr uint8_t kFirstBytes = 6;
+constexpr uint8_t kFirstBytes = 10;
 // A stop is to reach the next frame even if it comes just before it.
 constexpr uint16_t kAlertUs = 1300;
 // Segments that come this soon after the queue ran dry were meant to come before.
@@ -174,8 +174,8 @@ void Board::handle_reliable() {
 
 // False where the command has to come again.
 bool Board::carry_out() {
-  const Verdict verdict = decide();
-  if (verdict.ok())
+  Verdict verdict;
+  if (decide(verdict))
     return true;
   if (verdict.later || refusal_.pending())
     return false;
@@ -203,45 +203,49 @@ void Board::refuse(MessageType type, uint8_t sequence, const Verdict& verdict) {
   raise(Event::kMotionRefused);
 }
 
-Verdict Board::decide() {
+bool Board::decide(Verdict& verdict) {
   switch (receiver_.type()) {
     case MessageType::kEnable:
-      return enable();
+      return enable(verdict);
     case MessageType::kResume:
-      return resume();
+      return resume(verdict);
     case MessageType::kRelax:
-      return relax();
+      return relax(verdict);
     case MessageType::kLimp:
-      return limp();
-    case MessageType::kSegments: {
-      const Verdict verdict = segments();
-      if (verdict.ok())
-        play_if_ready();
-      return verdict;
-    }
+      limp();
+      return true;
+    case MessageType::kSegments:
+      if (!segments(verdict))
+        return false;
+      play_if_ready();
+      return true;
     case MessageType::kGuard:
-      return guard();
+      return guard(verdict);
     case MessageType::kDisarm:
-      return disarm();
+      return disarm(verdict);
     case MessageType::kSetLimits:
-      return set_limits();
+      return set_limits(verdict);
     case MessageType::kStoreLimits:
-      return store_limits();
+      return store_limits(verdict);
     default:
-      return Verdict::refuse(Refusal::kBadField);
+      return verdict.refuse(Refusal::kBadField);
   }
 }
 
-Verdict Board::enable() {
+bool Board::allows(Event event, Verdict& verdict) const {
+  const Refusal reason = ask(event);
+  return reason == Refusal::kNone || verdict.refuse(reason);
+}
+
+bool Board::enable(Verdict& verdict) {
   protocol::Enable message;
   decode(receiver_.payload(), message);
-  Verdict verdict = ask(Event::kEnable);
-  if (verdict.ok() && record_pending())
-    verdict = Verdict::refuse(Refusal::kRecordPending);
-  if (verdict.ok())
-    verdict = limits_.check_pose(message.pulse_ticks);
-  if (!verdict.ok())
-    return verdict;
+  if (!allows(Event::kEnable, verdict))
+    return false;
+  if (record_pending())
+    return verdict.refuse(Refusal::kRecordPending);
+  if (!limits_.check_pose(message.pulse_ticks, verdict))
+    return false;
 
   for (uint8_t i = 0; i < protocol::kServos; ++i)
     next_.ticks[i] = message.pulse_ticks[i];
@@ -252,114 +256,104 @@ Verdict Board::enable() {
   attacher_.step(attached_);
   hal_.set_pulses(next_, attached_);
   detector_.coarse_on(limits_.coarse_threshold_raw());
-  return raise(Event::kEnable);
+  raise(Event::kEnable);
+  return true;
 }
 
-Verdict Board::resume() {
+bool Board::resume(Verdict& verdict) {
   protocol::Resume message;
   decode(receiver_.payload(), message);
-  if (message.epoch != epoch_) {
-    return Verdict::refuse(Refusal::kWrongEpoch, kNoIndex, message.epoch, epoch_);
-  }
+  if (message.epoch != epoch_)
+    return verdict.refuse(Refusal::kWrongEpoch, kNoIndex, message.epoch, epoch_);
   if (record_pending() && mode_ != Mode::kReflex)
-    return Verdict::refuse(Refusal::kRecordPending);
-  if (mode_ == Mode::kFault && fault_persists()) {
-    return Verdict::refuse(Refusal::kFault, kNoIndex, fault_.record().fault);
-  }
+    return verdict.refuse(Refusal::kRecordPending);
+  if (mode_ == Mode::kFault && fault_persists())
+    return verdict.refuse(Refusal::kFault, kNoIndex, fault_.record().fault, 0);
   if (stop_switch_open())
-    return Verdict::refuse(Refusal::kStopSwitch);
+    return verdict.refuse(Refusal::kStopSwitch);
   const Mode before = mode_;
-  const Verdict verdict = raise(attached_ == 0            ? Event::kResumeDetached
-                                : attached_ == kAllServos ? Event::kResumeAttached
-                                                          : Event::kResumePartly);
+  const Refusal reason = raise(attached_ == 0            ? Event::kResumeDetached
+                               : attached_ == kAllServos ? Event::kResumeAttached
+                                                         : Event::kResumePartly);
   if (mode_ == Mode::kAttaching && before != Mode::kAttaching)
     attacher_.start();
-  return verdict;
+  return reason == Refusal::kNone || verdict.refuse(reason);
 }
 
-Verdict Board::relax() {
+bool Board::relax(Verdict& verdict) {
   protocol::Relax message;
   decode(receiver_.payload(), message);
-  Verdict verdict = ask(Event::kRelax);
-  if (verdict.ok())
-    verdict = limits_.check_slew(message.slew_ticks);
-  if (verdict.ok())
-    verdict = limits_.check_pose(message.free_ticks);
-  if (!verdict.ok())
-    return verdict;
-
+  if (!allows(Event::kRelax, verdict) || !limits_.check_slew(message.slew_ticks, verdict) ||
+      !limits_.check_pose(message.free_ticks, verdict)) {
+    return false;
+  }
   player_.clear();
   detector_.guard_off();
-  verdict = raise(Event::kRelax);
+  raise(Event::kRelax);
   if (mode_ == Mode::kUnwinding)
     start_line(message.free_ticks, message.slew_ticks);
-  return verdict;
+  return true;
 }
 
-Verdict Board::limp() {
+void Board::limp() {
   detector_.guard_off();
   switch_off();
-  return raise(Event::kLimp);
+  raise(Event::kLimp);
 }
 
-Verdict Board::segments() {
+bool Board::segments(Verdict& verdict) {
   protocol::Segments message;
   decode(receiver_.payload(), message);
   if (message.epoch != epoch_)
-    return Verdict::accept();  // discarded: it was sent too early
-  Verdict verdict = ask(Event::kSegments);
-  if (verdict.ok())
-    verdict = check_segments(message);
-  if (!verdict.ok())
-    return verdict;
+    return true;  // discarded: it was sent too early
+  if (!allows(Event::kSegments, verdict) || !check_segments(message, verdict))
+    return false;
   if (message.count > player_.room())
-    return Verdict::wait();
+    return verdict.wait();
 
   if (ran_dry_ && frame_ - ran_dry_frame_ <= kUnderrunFrames)
     ++underruns_;
   ran_dry_ = false;
   for (uint8_t i = 0; i < message.count; ++i)
     player_.push(message.segments[i]);
-  return raise(Event::kSegments);
+  raise(Event::kSegments);
+  return true;
 }
 
 // All of them before any is queued.
-Verdict Board::check_segments(const protocol::Segments& message) const {
+bool Board::check_segments(const protocol::Segments& message, Verdict& verdict) const {
   if (message.count == 0 || message.count > protocol::kSegmentsPerMessage) {
-    return Verdict::refuse(Refusal::kBadField, kNoIndex, message.count,
-                           protocol::kSegmentsPerMessage);
+    return verdict.refuse(Refusal::kBadField, kNoIndex, message.count,
+                          protocol::kSegmentsPerMessage);
   }
   const uint16_t* from = player_.empty() ? next_.ticks : player_.end_ticks();
   for (uint8_t i = 0; i < message.count; ++i) {
     const protocol::Segment& segment = message.segments[i];
     if (segment.duration_frames == 0)
-      return Verdict::refuse(Refusal::kBadField, i, 0, 1);
-    Verdict verdict = limits_.check_pose(segment.target_ticks);
-    if (verdict.ok()) {
-      verdict = limits_.check_line(from, segment.target_ticks, segment.duration_frames, i);
+      return verdict.refuse(Refusal::kBadField, i, 0, 1);
+    if (!limits_.check_pose(segment.target_ticks, verdict) ||
+        !limits_.check_line(from, segment.target_ticks, segment.duration_frames, i, verdict)) {
+      return false;
     }
-    if (!verdict.ok())
-      return verdict;
     from = segment.target_ticks;
   }
-  return Verdict::accept();
+  return true;
 }
 
-Verdict Board::guard() {
+bool Board::guard(Verdict& verdict) {
   protocol::GuardMessage message;
   decode(receiver_.payload(), message);
   if (message.epoch != epoch_)
-    return Verdict::accept();
-  Verdict verdict = ask(Event::kGuard);
-  if (verdict.ok() && !player_.empty())
-    verdict = Verdict::refuse(Refusal::kBusy);
-  if (verdict.ok())
-    verdict = check_guard(message);
-  if (verdict.ok() && sensor_ != protocol::Sensor::kOk) {
-    verdict = Verdict::refuse(Refusal::kSensorUnavailable, kNoIndex, static_cast<uint8_t>(sensor_));
+    return true;
+  if (!allows(Event::kGuard, verdict))
+    return false;
+  if (!player_.empty())
+    return verdict.refuse(Refusal::kBusy);
+  if (!check_guard(message, verdict))
+    return false;
+  if (sensor_ != protocol::Sensor::kOk) {
+    return verdict.refuse(Refusal::kSensorUnavailable, kNoIndex, static_cast<uint8_t>(sensor_), 0);
   }
-  if (!verdict.ok())
-    return verdict;
 
   reflex_ = static_cast<protocol::Reflex>(message.reflex);
   for (uint8_t i = 0; i < protocol::kServos; ++i)
@@ -367,58 +361,52 @@ Verdict Board::guard() {
   retract_slew_ticks_ = message.retract_slew_ticks;
   guard_sequence_ = receiver_.header().sequence;
   detector_.guard_move(message.threshold_raw, message.consecutive, message.deadline_frames);
-  return raise(Event::kGuard);
+  raise(Event::kGuard);
+  return true;
 }
 
-Verdict Board::check_guard(const protocol::GuardMessage& message) const {
+bool Board::check_guard(const protocol::GuardMessage& message, Verdict& verdict) const {
   if (message.threshold_raw == 0 || message.consecutive == 0 || message.consecutive > 8 ||
       message.deadline_frames == 0 || message.reflex >= protocol::kReflexCount) {
-    return Verdict::refuse(Refusal::kBadField);
+    return verdict.refuse(Refusal::kBadField);
   }
   // A guard that is blinder than unguarded motion is none.
   const uint32_t coarse_raw = limits_.coarse_threshold_raw();
   if (coarse_raw != 0 && message.threshold_raw > coarse_raw) {
-    return Verdict::refuse(Refusal::kOutOfLimits, kNoIndex,
-                           static_cast<int32_t>(message.threshold_raw),
-                           static_cast<int32_t>(coarse_raw));
+    return verdict.refuse(Refusal::kOutOfLimits, kNoIndex,
+                          static_cast<int32_t>(message.threshold_raw),
+                          static_cast<int32_t>(coarse_raw));
   }
-  if (message.reflex == static_cast<uint8_t>(protocol::Reflex::kHold))
-    return Verdict::accept();
-  const Verdict verdict = limits_.check_slew(message.retract_slew_ticks);
-  return verdict.ok() ? limits_.check_pose(message.retract_ticks) : verdict;
+  return message.reflex == static_cast<uint8_t>(protocol::Reflex::kHold) ||
+         (limits_.check_slew(message.retract_slew_ticks, verdict) &&
+          limits_.check_pose(message.retract_ticks, verdict));
 }
 
-Verdict Board::disarm() {
-  const Verdict verdict = ask(Event::kDisarm);
-  if (!verdict.ok())
-    return verdict;
+bool Board::disarm(Verdict& verdict) {
+  if (!allows(Event::kDisarm, verdict))
+    return false;
   // Segments that wait for the guard must not run without it.
   if (mode_ == Mode::kHolding && !player_.empty())
-    return Verdict::refuse(Refusal::kBusy);
+    return verdict.refuse(Refusal::kBusy);
   detector_.guard_off();
-  return raise(Event::kDisarm);
+  raise(Event::kDisarm);
+  return true;
 }
 
-Verdict Board::set_limits() {
+bool Board::set_limits(Verdict& verdict) {
   protocol::SetLimits message;
   decode(receiver_.payload(), message);
-  Verdict verdict = ask(Event::kSetLimits);
-  if (verdict.ok())
-    verdict = limits_.set(message);
-  if (verdict.ok())
-    store_.cancel();
-  return verdict;
+  if (!allows(Event::kSetLimits, verdict) || !limits_.set(message, verdict))
+    return false;
+  store_.cancel();
+  return true;
 }
 
-Verdict Board::store_limits() {
-  const Verdict verdict = ask(Event::kSetLimits);
-  if (!verdict.ok())
-    return verdict;
-  if (supply_low_)
-    return Verdict::refuse(Refusal::kSupplyLow, kNoIndex, supply_mv(hal_.bandgap_part()),
-                           kSupplyLowMv);
+bool Board::store_limits(Verdict& verdict) {
+  if (!allows(Event::kSetLimits, verdict))
+    return false;
   store_.start();
-  return verdict;
+  return true;
 }
 
 }  // namespace setae

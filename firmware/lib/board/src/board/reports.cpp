@@ -37,12 +37,12 @@ void Board::report() {
     return;
   if (record && (!send_latched(trip_) || !send_latched(fault_) || !send_latched(refusal_)))
     return;
-  for (uint8_t report = 1; report <= wanted && report != 0; report <<= 1) {
-    if ((wanted & report) == 0)
-      continue;
-    if (!send(static_cast<Report>(report)))
+  while (wanted != 0) {
+    const uint8_t first = wanted & static_cast<uint8_t>(-wanted);
+    if (!send(static_cast<Report>(first)))
       return;
-    wanted_ &= static_cast<uint8_t>(~report);
+    wanted &= static_cast<uint8_t>(~first);
+    wanted_ &= static_cast<uint8_t>(~first);
   }
 }
 
@@ -68,27 +68,25 @@ template <typename Record>
 bool Board::send_latched(Latch<Record>& latch) {
   if (!latch.wanted(session_.open()))
     return true;
-  if (!transmitter_.send(header(), latch.record()))
+  if (!transmitter_.send(Header(*this), latch.record()))
     return false;
   latch.sent();
   return true;
 }
 
-protocol::BoardHeader Board::header() const {
-  protocol::BoardHeader header = {};
-  header.session = session_.id();
-  header.expected = session_.expected();
-  header.credit = player_.room();
-  header.epoch = epoch_;
-  header.state = static_cast<uint8_t>(state_of(mode_));
-  if (refusal_.pending())
-    header.state |= protocol::kRefusalWaits;
-  return header;
+Board::Header::Header(const Board& board) {
+  session = board.session_.id();
+  expected = board.session_.expected();
+  credit = board.player_.room();
+  epoch = board.epoch_;
+  state = static_cast<uint8_t>(state_of(board.mode_));
+  if (board.refusal_.pending())
+    state |= protocol::kRefusalWaits;
 }
 
 bool Board::send_receipt() {
   const protocol::Receipt receipt = {gap_};
-  if (!transmitter_.send(header(), receipt))
+  if (!transmitter_.send(Header(*this), receipt))
     return false;
   gap_ = false;
   return true;
@@ -112,18 +110,18 @@ bool Board::send_hello_reply() {
   for (uint8_t i = 0; i < protocol::kServos; ++i)
     reply.pulse_ticks[i] = pose.pulses.ticks[i];
   reply.sensor = static_cast<uint8_t>(sensor_);
-  return transmitter_.send(header(), reply);
+  return transmitter_.send(Header(*this), reply);
 }
 
 bool Board::send_limits() {
-  return transmitter_.send_as(protocol::Limits::kType, header(), limits_.in_force());
+  return transmitter_.send_as(protocol::Limits::kType, Header(*this), limits_.in_force());
 }
 
 bool Board::send_pong() {
   // The moment of answering, not of asking: the host halves the round trip.
   const BoardTime now = hal_.now();
   const protocol::Pong pong = {ping_token_, now.frame, now.phase_us};
-  return transmitter_.send(header(), pong);
+  return transmitter_.send(Header(*this), pong);
 }
 
 bool Board::send_telemetry() {
@@ -148,7 +146,7 @@ bool Board::send_telemetry() {
   telemetry.rx_damaged = receiver_.damaged();
   telemetry.stop_number = stop_number_;
   telemetry.underruns = underruns_;
-  if (!transmitter_.send(header(), telemetry))
+  if (!transmitter_.send(Header(*this), telemetry))
     return false;
   samples_.clear();
   return true;
@@ -165,7 +163,7 @@ bool Board::send_status() {
   status.rx_overruns = errors.overrun;
   status.rx_overflows = errors.dropped;
   status.late_pulses = hal_.late_pulses();
-  if (!transmitter_.send(header(), status))
+  if (!transmitter_.send(Header(*this), status))
     return false;
   status_age_frames_ = 0;
   return true;

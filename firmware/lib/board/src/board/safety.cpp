@@ -96,9 +96,9 @@ void Board::refuse_tare(Refusal reason, uint32_t value, uint32_t limit) {
     detector_.tare_again();
     return;
   }
-  refuse(
-      protocol::MessageType::kGuard, guard_sequence_,
-      Verdict::refuse(reason, kNoIndex, static_cast<int32_t>(value), static_cast<int32_t>(limit)));
+  Verdict verdict;
+  verdict.refuse(reason, kNoIndex, static_cast<int32_t>(value), static_cast<int32_t>(limit));
+  refuse(protocol::MessageType::kGuard, guard_sequence_, verdict);
 }
 
 // A contact becomes a stop here: frozen pulses first, then the record.

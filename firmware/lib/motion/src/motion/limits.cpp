@@ -8,81 +8,75 @@ using protocol::Refusal;
 
 namespace {
 
-Verdict check_range(int32_t value, int32_t low, int32_t high, Refusal reason, uint8_t index) {
+bool check_range(int32_t value, int32_t low, int32_t high, Refusal reason, uint8_t index,
+                 Verdict& verdict) {
   if (value < low)
-    return Verdict::refuse(reason, index, value, low);
+    return verdict.refuse(reason, index, value, low);
   if (value > high)
-    return Verdict::refuse(reason, index, value, high);
-  return Verdict::accept();
+    return verdict.refuse(reason, index, value, high);
+  return true;
 }
 
 }  // namespace
 
-Verdict Limits::set(const protocol::SetLimits& limits) {
+bool Limits::set(const protocol::SetLimits& limits, Verdict& verdict) {
   for (uint8_t i = 0; i < protocol::kServos; ++i) {
-    Verdict verdict = check_range(limits.pulse_max_ticks[i], protocol::kPulseTicksAbsoluteMin,
-                                  protocol::kPulseTicksAbsoluteMax, Refusal::kOutOfLimits, i);
-    if (!verdict.ok())
-      return verdict;
-    verdict = check_range(limits.pulse_min_ticks[i], protocol::kPulseTicksAbsoluteMin,
-                          limits.pulse_max_ticks[i], Refusal::kOutOfLimits, i);
-    if (!verdict.ok())
-      return verdict;
+    if (!check_range(limits.pulse_max_ticks[i], protocol::kPulseTicksAbsoluteMin,
+                     protocol::kPulseTicksAbsoluteMax, Refusal::kOutOfLimits, i, verdict) ||
+        !check_range(limits.pulse_min_ticks[i], protocol::kPulseTicksAbsoluteMin,
+                     limits.pulse_max_ticks[i], Refusal::kOutOfLimits, i, verdict)) {
+      return false;
+    }
   }
   for (uint8_t i = 0; i < protocol::kPairs; ++i) {
     if (limits.pair_sum_min_ticks[i] > limits.pair_sum_max_ticks[i]) {
-      return Verdict::refuse(Refusal::kPairLimit, i, limits.pair_sum_min_ticks[i],
-                             limits.pair_sum_max_ticks[i]);
+      return verdict.refuse(Refusal::kPairLimit, i, limits.pair_sum_min_ticks[i],
+                            limits.pair_sum_max_ticks[i]);
     }
     if (limits.pair_difference_min_ticks[i] > limits.pair_difference_max_ticks[i]) {
-      return Verdict::refuse(Refusal::kPairLimit, i, limits.pair_difference_min_ticks[i],
-                             limits.pair_difference_max_ticks[i]);
+      return verdict.refuse(Refusal::kPairLimit, i, limits.pair_difference_min_ticks[i],
+                            limits.pair_difference_max_ticks[i]);
     }
   }
   if (limits.slew_ticks == 0)
-    return Verdict::refuse(Refusal::kBadField, kNoIndex, 0, 1);
+    return verdict.refuse(Refusal::kBadField, kNoIndex, 0, 1);
   limits_ = limits;
-  return Verdict::accept();
+  return true;
 }
 
-Verdict Limits::check_pose(const uint16_t* ticks) const {
+bool Limits::check_pose(const uint16_t* ticks, Verdict& verdict) const {
   for (uint8_t i = 0; i < protocol::kServos; ++i) {
-    const Verdict verdict = check_range(ticks[i], limits_.pulse_min_ticks[i],
-                                        limits_.pulse_max_ticks[i], Refusal::kOutOfLimits, i);
-    if (!verdict.ok())
-      return verdict;
+    if (!check_range(ticks[i], limits_.pulse_min_ticks[i], limits_.pulse_max_ticks[i],
+                     Refusal::kOutOfLimits, i, verdict)) {
+      return false;
+    }
   }
   for (uint8_t i = 0; i < protocol::kPairs; ++i) {
     const int32_t a = ticks[i];
     const int32_t b = ticks[i + protocol::kPairs];
-    Verdict verdict = check_range(a + b, limits_.pair_sum_min_ticks[i],
-                                  limits_.pair_sum_max_ticks[i], Refusal::kPairLimit, i);
-    if (!verdict.ok())
-      return verdict;
-    verdict = check_range(a - b, limits_.pair_difference_min_ticks[i],
-                          limits_.pair_difference_max_ticks[i], Refusal::kPairLimit, i);
-    if (!verdict.ok())
-      return verdict;
+    if (!check_range(a + b, limits_.pair_sum_min_ticks[i], limits_.pair_sum_max_ticks[i],
+                     Refusal::kPairLimit, i, verdict) ||
+        !check_range(a - b, limits_.pair_difference_min_ticks[i],
+                     limits_.pair_difference_max_ticks[i], Refusal::kPairLimit, i, verdict)) {
+      return false;
+    }
   }
-  return Verdict::accept();
+  return true;
 }
 
-Verdict Limits::check_line(const uint16_t* from, const uint16_t* to, uint16_t frames,
-                           uint8_t index) const {
+bool Limits::check_line(const uint16_t* from, const uint16_t* to, uint16_t frames, uint8_t index,
+                        Verdict& verdict) const {
   const uint16_t distance = longest_distance(from, to);
   const uint32_t reach = static_cast<uint32_t>(limits_.slew_ticks) * frames;
-  if (distance <= reach)
-    return Verdict::accept();
-  return Verdict::refuse(Refusal::kTooFast, index, distance, static_cast<int32_t>(reach));
+  return distance <= reach ||
+         verdict.refuse(Refusal::kTooFast, index, distance, static_cast<int32_t>(reach));
 }
 
-Verdict Limits::check_slew(uint16_t slew_ticks) const {
+bool Limits::check_slew(uint16_t slew_ticks, Verdict& verdict) const {
   if (slew_ticks == 0)
-    return Verdict::refuse(Refusal::kBadField, kNoIndex, 0, 1);
-  if (slew_ticks > limits_.slew_ticks) {
-    return Verdict::refuse(Refusal::kTooFast, kNoIndex, slew_ticks, limits_.slew_ticks);
-  }
-  return Verdict::accept();
+    return verdict.refuse(Refusal::kBadField, kNoIndex, 0, 1);
+  return slew_ticks <= limits_.slew_ticks ||
+         verdict.refuse(Refusal::kTooFast, kNoIndex, slew_ticks, limits_.slew_ticks);
 }
 
 void Limits::confine(const Pulses& previous, Pulses& pulses) const {

@@ -18,15 +18,15 @@ class Limits {
  public:
   // None yet: all bounds are zero, and no pose is allowed.
   const protocol::SetLimits& in_force() const { return limits_; }
-  Verdict set(const protocol::SetLimits& limits);
+  bool set(const protocol::SetLimits& limits, Verdict& verdict);
 
   // Each servo's range, sums and differences of opposite tendons.
-  Verdict check_pose(const uint16_t* ticks) const;
+  bool check_pose(const uint16_t* ticks, Verdict& verdict) const;
   // A straight line of that many frames. `index` is told to the host where it is too fast.
-  Verdict check_line(const uint16_t* from, const uint16_t* to, uint16_t frames,
-                     uint8_t index) const;
+  bool check_line(const uint16_t* from, const uint16_t* to, uint16_t frames, uint8_t index,
+                  Verdict& verdict) const;
   // A speed for a move that the board plans itself.
-  Verdict check_slew(uint16_t slew_ticks) const;
+  bool check_slew(uint16_t slew_ticks, Verdict& verdict) const;
 
   // The last guard before the servos: never outside a servo's range, never faster than the slew
   // limit, whatever was planned.

@@ -9,20 +9,30 @@ namespace setae {
 
 constexpr uint8_t kNoIndex = 255;
 
+// Filled in where a check fails: those that pass, which are most, have nothing to hand back.
 struct Verdict {
-  protocol::Refusal reason;
-  bool later;  // neither done nor refused: no room yet, the host sends it again
-  uint8_t index;
-  int32_t value;
-  int32_t limit;
+  protocol::Refusal reason = protocol::Refusal::kNone;
+  bool later = false;  // neither done nor refused: no room yet, the host sends it again
+  uint8_t index = kNoIndex;
+  int32_t value = 0;
+  int32_t limit = 0;
 
   bool ok() const { return reason == protocol::Refusal::kNone && !later; }
 
-  static Verdict accept() { return {protocol::Refusal::kNone, false, kNoIndex, 0, 0}; }
-  static Verdict wait() { return {protocol::Refusal::kNone, true, kNoIndex, 0, 0}; }
-  static Verdict refuse(protocol::Refusal reason, uint8_t index = kNoIndex, int32_t value = 0,
-                        int32_t limit = 0) {
-    return {reason, false, index, value, limit};
+  // All are false: what the check returns.
+  bool wait() {
+    later = true;
+    return false;
+  }
+  bool refuse(protocol::Refusal why) {
+    reason = why;
+    return false;
+  }
+  bool refuse(protocol::Refusal why, uint8_t at, int32_t is, int32_t bound) {
+    index = at;
+    value = is;
+    limit = bound;
+    return refuse(why);
   }
 };
 
