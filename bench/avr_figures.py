@@ -112,10 +112,14 @@ def commands() -> Iterable[Figure]:
     """How long a new pose takes to the pins."""
     found = _commands()
     times_ms = [max(command.ends_ms) for command in found]
-    by_servo = ", ".join(
-        f"{statistics.mean(ends):.1f}/{max(ends):.1f}"
-        for ends in zip(*(command.ends_ms for command in found), strict=True)
-    )
+
+    def by_servo(times: Iterable[tuple[float, ...]]) -> str:
+        return ", ".join(
+            f"{statistics.mean(one):.1f}/{max(one):.1f}" for one in zip(*times, strict=True)
+        )
+
+    begins = by_servo(command.begins_ms for command in found)
+    ends = by_servo(command.ends_ms for command in found)
     how = (
         f"{_UNO}: {len(found)} new poses within the robot's travel at random phases, {_LOAD}; from"
         " the command's last byte to the end of the last of the four new pulses"
@@ -124,7 +128,7 @@ def commands() -> Iterable[Figure]:
         "command_to_pulse_ms_mean",
         round(statistics.mean(times_ms), 2),
         "ms",
-        f"{how}; mean/max of each servo: {by_servo}",
+        f"{how}; mean/max until each servo's new pulse begins: {begins}, and ends: {ends}",
     )
     yield Figure("command_to_pulse_ms_max", round(max(times_ms), 2), "ms", how)
 

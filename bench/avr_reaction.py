@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from bench.avr import CYCLES_PER_MS, RATE_SPREAD, board, frame_start, random_ticks
 from tests.avr.driver import Driver, FramePulses, Load, Ticks, first_still
-from tests.avr.simavr import CYCLES_PER_TICK, CYCLES_PER_US, FRAME_CYCLES
+from tests.avr.simavr import CYCLES_PER_TICK, CYCLES_PER_US, FRAME_CYCLES, Pulse
 
 from setae_protocol.messages import SERVOS, Guard, State
 
@@ -128,8 +128,9 @@ def _frame_of(frame: FramePulses, phase: int) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """One new pose: from the command's last byte to the end of each servo's first new pulse."""
+    """One new pose: from the command's last byte to each servo's first new pulse, and its end."""
 
+    begins_ms: tuple[float, ...]
     ends_ms: tuple[float, ...]
     stack_bytes: int
 
@@ -151,10 +152,12 @@ def commands(count: int, seed: int) -> list[Command]:
             driver.queue([pose])
             arrived = uno.line_free
             driver.session.run_for(80_000)
+            first = _first_pulses(driver, pose)
             found.append(
                 Command(
+                    begins_ms=tuple((pulse.rise - arrived) / CYCLES_PER_MS for pulse in first),
                     ends_ms=tuple(
-                        (end - arrived) / CYCLES_PER_MS for end in _first_ends(driver, pose)
+                        (pulse.rise + pulse.width - arrived) / CYCLES_PER_MS for pulse in first
                     ),
                     stack_bytes=uno.statistics().stack_bytes,
                 )
@@ -169,12 +172,12 @@ def _another(rng: random.Random, pose: Ticks) -> Ticks:
             return drawn
 
 
-def _first_ends(driver: Driver, pose: Sequence[int]) -> list[int]:
-    """When each servo's first pulse of its new width ended."""
+def _first_pulses(driver: Driver, pose: Sequence[int]) -> list[Pulse]:
+    """Each servo's first pulse of its new width."""
     found = driver.pulses()
     return [
         next(
-            pulse.rise + pulse.width
+            pulse
             for pulse in found
             if pulse.servo == servo and pulse.width == pose[servo] * CYCLES_PER_TICK
         )

@@ -74,6 +74,16 @@ def write_seconds(path: Path, seconds: float) -> Path:
         recorder.refusal(
             11, record_id=1, command="segments", reason="too_fast", index=2, value=90, limit=80
         )
+        recorder.status(
+            12,
+            supply_mv=4950,
+            storing=False,
+            stop_switch_open=True,
+            rx_framing_errors=1,
+            rx_overruns=2,
+            rx_overflows=3,
+            late_pulses=4,
+        )
     return path
 
 
@@ -92,6 +102,7 @@ def test_what_is_written_comes_back(tmp_path: Path) -> None:
     assert np.isnan(log.array("/truth", "contact_point_mm")).all()
     assert log.messages("/trip")[0]["contact"] == {"tip_mm": [1.0, 2.0, 110.0]}
     assert log.messages("/refusal")[0]["reason"] == "too_fast"
+    assert log.messages("/status")[0]["rx_overruns"] == 2
     event = log.events("trial_start")[0]
     assert (event.time_us, event.name, event.data) == (0, "trial_start", {"obstacle": None})
     assert log.span_us == (0, 99 * 20_000 + 5)

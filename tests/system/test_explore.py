@@ -157,6 +157,16 @@ def test_the_arm_returns_to_its_start_and_the_robot_is_left_relaxed(paper: list[
         assert log.messages("/telemetry")[-1]["state"] == "relaxed"
 
 
+def test_the_log_tells_what_the_board_says_of_itself_once_a_second(paper: list[Trial]) -> None:
+    for trial in paper:
+        log = read(trial)
+        begin_us, end_us = log.span_us
+        told = log.messages("/status")
+        assert len(told) == pytest.approx((end_us - begin_us) / 1e6, abs=3)
+        assert {message["supply_mv"] for message in told} == {5006}
+        assert {message["rx_overruns"] + message["late_pulses"] for message in told} == {0}
+
+
 def test_the_board_retracts_by_itself_before_the_host_asks_for_anything(
     paper: list[Trial],
 ) -> None:

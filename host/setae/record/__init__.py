@@ -13,6 +13,7 @@ topic           rate        what
 /trip           on event    a contact or deadline froze the pulses, `Recorder.trip`
 /fault          on event    the board is in fault, `Recorder.fault`
 /refusal        on event    the board refused a command, `Recorder.refusal`
+/status         1 Hz        the board's supply, stop switch and counters, `Recorder.status`
 /command        on event    what the program asked for, `Recorder.command`
 /stage          on change   the arm that carries the robot, `Recorder.stage`
 /experiment     on event    steps of an experiment, `Recorder.experiment`

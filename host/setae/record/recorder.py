@@ -240,6 +240,33 @@ class Recorder:
             },
         )
 
+    def status(
+        self,
+        time_us: int,
+        *,
+        supply_mv: int,
+        storing: bool,
+        stop_switch_open: bool,
+        rx_framing_errors: int,
+        rx_overruns: int,
+        rx_overflows: int,
+        late_pulses: int,
+    ) -> None:
+        """What the board tells of itself; its counters count from its start, modulo 256."""
+        self.write(
+            "/status",
+            time_us,
+            {
+                "supply_mv": supply_mv,
+                "storing": storing,
+                "stop_switch_open": stop_switch_open,
+                "rx_framing_errors": rx_framing_errors,
+                "rx_overruns": rx_overruns,
+                "rx_overflows": rx_overflows,
+                "late_pulses": late_pulses,
+            },
+        )
+
     def refusal(
         self,
         time_us: int,

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from setae.errors import LogError
-from setae.link.events import Event, FaultReported, Refused, TelemetryReceived, Tripped
+from setae.link.events import (
+    Event,
+    FaultReported,
+    Refused,
+    StatusReceived,
+    TelemetryReceived,
+    Tripped,
+)
 from setae.record import Recorder
 from setae.robot import Robot
 from setae.sim import World
@@ -81,6 +88,18 @@ class RigLog:
                 fault=fault.fault.name.lower(),
                 detail=fault.detail,
                 pulse_us=np.array(fault.pulse_ticks) / PULSE_TICKS_PER_US,
+            )
+        elif isinstance(event, StatusReceived):
+            status = event.status
+            self.recorder.status(
+                event.time_us,
+                supply_mv=status.supply_mv,
+                storing=bool(status.storing),
+                stop_switch_open=bool(status.stop_switch_open),
+                rx_framing_errors=status.rx_framing_errors,
+                rx_overruns=status.rx_overruns,
+                rx_overflows=status.rx_overflows,
+                late_pulses=status.late_pulses,
             )
         elif isinstance(event, Refused):
             refusal = event.record

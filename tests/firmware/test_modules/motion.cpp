@@ -28,14 +28,16 @@ Limits default_limits() {
 
 Verdict pose_verdict(const Limits& limits, const Pulses& pose) {
   Verdict verdict;
-  CHECK(limits.check_pose(pose.ticks, verdict) == verdict.ok());
+  const bool ok = limits.check_pose(pose.ticks, verdict);
+  CHECK(ok == verdict.ok());
   return verdict;
 }
 
 Verdict line_verdict(const Limits& limits, const Pulses& from, const Pulses& to, uint16_t frames,
                      uint8_t index) {
   Verdict verdict;
-  CHECK(limits.check_line(from.ticks, to.ticks, frames, index, verdict) == verdict.ok());
+  const bool ok = limits.check_line(from.ticks, to.ticks, frames, index, verdict);
+  CHECK(ok == verdict.ok());
   return verdict;
 }
 
