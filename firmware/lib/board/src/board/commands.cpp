@@ -27,7 +27,7 @@ void Board::receive() {
     if (!ring.ended && (receiver_.inside() || waiting < kFirstBytes))
       return;
     // While the line is busy nobody could be answered: let it become more.
-    if (!transmitter_.ready() && !hal_.frame_ends_within(kAlertUs))
+    if (hal_.sending() && !hal_.frame_ends_within(kAlertUs))
       return;
   }
   // And not what comes meanwhile, byte by byte, unless it ends a frame.
@@ -50,11 +50,11 @@ bool Board::take_received() {
     left -= count;
     if (message) {
       handle_message();
-      report();
       if (sample_goes_first()) {
         ring.ended = true;
         return false;
       }
+      report();
     }
   }
   return true;

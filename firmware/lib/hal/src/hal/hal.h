@@ -52,6 +52,9 @@ class Hal {
   // Serial line: what has come, and what is to go. The board reads the one and writes the other.
   SETAE_ASK ReceiveRing& received() SETAE_ANSWER;
   SETAE_ASK TransmitRing& to_send() SETAE_ANSWER;
+  // So much waits on its way to the host that an answer would have to wait, for a millisecond at
+  // most.
+  SETAE_ASK bool sending() SETAE_ANSWER;
   // After each publish().
   SETAE_ASK void start_sending() SETAE_ANSWER;
   // What the line lost; each modulo 256.

@@ -70,6 +70,10 @@ TransmitRing& Hal::to_send() {
   return uart::to_send();
 }
 
+bool Hal::sending() {
+  return uart::to_send().size() > kTransmitRingBytes / 4;
+}
+
 void Hal::start_sending() {
   uart::start_sending();
 }
