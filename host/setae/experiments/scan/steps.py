@@ -19,7 +19,7 @@ from setae.stage import Stage, move_timeout_s
 from setae_protocol.messages import PRESSURE_LSB_PER_HPA, Guard
 
 # A contact so soon after an extension's start was there before it.
-_AT_ONCE_MM = 1.5
+_AT_ONCE_MM = 2.5
 # Shorter moves of the arm are none.
 _HERE_MM = 0.02
 # Shorter differences of length are not worth a move of the spring.
