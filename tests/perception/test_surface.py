@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from tests.perception.synthetic import CONFIG, REACH_MM, felt
 
+from setae.experiments.scan.quality import Surface
 from setae.objects import SHAPES, ScanObject, random_object, table_scene
-from setae.perception.measures import nearness
+from setae.perception.measures import away_from_edges, nearness
 from setae.perception.surface import height_mm
 from setae.sim import World, add_solid
 
@@ -53,3 +54,16 @@ def test_a_half_felt_object_is_not_complete() -> None:
     assert near.height_rms_mm < 1e-9
     assert near.to_surface_mm < 0.5
     assert near.from_surface_mm > 10
+
+
+@pytest.mark.parametrize("shape", ["eraser", "orange"])
+def test_a_scan_and_a_comparison_leave_out_the_same_edges(shape: str) -> None:
+    # Each had a rule of its own, so two errors of one scan differed.
+    what = random_object(shape, 7)
+    solids, heights = table_scene(CONFIG, what).solids, felt(what)
+    fine_mm = np.arange(0.0, 201.0, 2.5)
+    surface = Surface(step_mm=2.5, height_mm=height_mm(solids, *np.meshgrid(fine_mm, fine_mm)))
+    places = np.meshgrid(heights.x_mm, heights.y_mm)
+    edges = surface.edges(heights)
+    assert edges.any()
+    assert (edges == ~away_from_edges(solids, *places)).all()

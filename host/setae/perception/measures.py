@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +16,13 @@ from setae.perception import maps
 from setae.perception.surface import height_mm
 from setae.solids import Solid
 
-__all__ = ["EDGE_MM", "Nearness", "away_from_edges", "nearness"]
+__all__ = ["EDGE_MM", "EDGE_STEP_MM", "Nearness", "away_from_edges", "nearness"]
 
-EDGE_MM = 6.0
-"""So near to a step the bristle may bend past it, or touch it from the side."""
-
-STEP_MM = 5.0
-"""Such a difference of height within `EDGE_MM` is a step, or a slope as steep as one."""
+EDGE_MM: Final = 5.0
+EDGE_STEP_MM: Final = 3.0
+"""A place is at an edge where the true surface within `EDGE_MM` of it, along x and y, differs by
+this much or more: there the bristle may bend past what it should touch, or touch it from the side.
+"""
 
 _DENSE_MM = 1.0
 
@@ -58,7 +59,7 @@ class Nearness:
 def away_from_edges(
     solids: Sequence[Solid], x_mm: FloatArray, y_mm: FloatArray
 ) -> NDArray[np.bool_]:
-    """Say which places have no step of the surface within `EDGE_MM`.
+    """Say which places are not at an edge (`EDGE_STEP_MM`).
 
     Parameters
     ----------
@@ -67,14 +68,9 @@ def away_from_edges(
     x_mm, y_mm
         Places, of one shape.
     """
-    turn = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
-    around = [
-        height_mm(solids, x_mm + part * EDGE_MM * np.cos(a), y_mm + part * EDGE_MM * np.sin(a))
-        for a in turn
-        for part in (0.5, 1.0)
-    ]
-    heights = np.stack([height_mm(solids, x_mm, y_mm), *around])
-    return np.asarray(heights.max(axis=0) - heights.min(axis=0) < STEP_MM)
+    beside_mm = np.linspace(-EDGE_MM, EDGE_MM, 5)
+    around = np.stack([height_mm(solids, x_mm + a, y_mm + b) for a in beside_mm for b in beside_mm])
+    return np.asarray(around.max(axis=0) - around.min(axis=0) < EDGE_STEP_MM)
 
 
 def nearness(heights: HeightMap, solids: Sequence[Solid], *, reach_mm: float) -> Nearness:

@@ -10,14 +10,10 @@ from numpy.typing import NDArray
 
 from setae.experiments.scan.run import ScanResult
 from setae.heightmap import HeightMap
+from setae.perception.measures import EDGE_MM, EDGE_STEP_MM
 from setae.record import Log
 
-__all__ = ["EDGE_MM", "EDGE_STEP_MM", "Quality", "Surface", "quality", "surface_of"]
-
-EDGE_MM: Final = 5.0
-EDGE_STEP_MM: Final = 3.0
-"""A place is at an edge where the true surface within `EDGE_MM` of it, along x and y, differs by
-this much or more."""
+__all__ = ["Quality", "Surface", "quality", "surface_of"]
 
 # Less than that above the extended tip is not felt for certain.
 _GRAZED_MM: Final = 3.0
