@@ -15,7 +15,6 @@ from setae.cli.common import console
 from setae.experiments.events import Event
 from setae.experiments.scan import Place
 from setae.heightmap import TOUCHED
-from setae.report import palette
 
 _REDRAW_S = 0.1
 # Without a terminal: a line each time so much more of the places is known.
@@ -28,6 +27,10 @@ class LiveMap:
     """Shows what a scan finds; a context manager."""
 
     def __init__(self) -> None:
+        # Not with the module: all reports come with it. Nor later: a scan would wait for it.
+        from setae.report import palette
+
+        self._heat = palette.heat
         self._places: dict[tuple[int, int], Place] = {}
         self._columns = self._rows = 0
         self._total = 1
@@ -104,7 +107,7 @@ class LiveMap:
                 else:
                     share = (place.height_mm - low) / max(high - low, 1.0)
                     sign = _SIGNS.get(place.mark, "+ " if place.mark == "inferred" else "  ")
-                    text.append(sign, style=f"black on {palette.heat(share)}")
+                    text.append(sign, style=f"black on {self._heat(share)}")
             text.append("\n")
         return text
 
