@@ -339,14 +339,17 @@ def test_bad_input_is_told_in_one_line(
     assert error.count("\n") == 1
 
 
-def test_a_real_robot_has_no_object() -> None:
+def test_a_real_robot_has_no_object(capsys: pytest.CaptureFixture[str]) -> None:
     main_ends(1, "scan", "--port", "/dev/null", "--object", "coil")
+    assert "for the simulator" in capsys.readouterr().err
 
 
 def test_events_reach_the_log_before_the_listener(tmp_path: Path) -> None:
     with record.Recorder(tmp_path / "log.mcap") as recorder:
-        seen: list[str] = []
-        told = recorded(recorder, lambda event: seen.append(event.name))
-        told(Event(time_us=1, name="place", data={}))
-    assert seen == ["place"]
+
+        def interrupted(event: Event) -> None:
+            raise KeyboardInterrupt(event.name)
+
+        with pytest.raises(KeyboardInterrupt, match="place"):
+            recorded(recorder, interrupted)(Event(time_us=1, name="place", data={}))
     assert record.read(tmp_path / "log.mcap").events("place")
