@@ -28,8 +28,10 @@ function show(index) {
     };
     const rows = scan.truth.height_mm.length, columns = rows ? scan.truth.height_mm[0].length : 0;
     const gap = () => { line.x.push(null); line.y.push(null); line.z.push(null); };
-    for (let i = 0; i < rows; i += 4) { for (let j = 0; j < columns; j++) add(i, j); gap(); }
-    for (let j = 0; j < columns; j += 4) { for (let i = 0; i < rows; i++) add(i, j); gap(); }
+    // A finer net would hide the points.
+    const every = 2;
+    for (let i = 0; i < rows; i += every) { for (let j = 0; j < columns; j++) add(i, j); gap(); }
+    for (let j = 0; j < columns; j += every) { for (let i = 0; i < rows; i++) add(i, j); gap(); }
     traces.push({
       type: "scatter3d", mode: "lines", ...line, connectgaps: false, hoverinfo: "skip", showlegend: false,
       line: { color: "#8a96a3", width: 2 },
@@ -43,7 +45,7 @@ function show(index) {
       aspectmode: "data",
       xaxis: axis("x (mm)", [0, scan.size_mm[0]]), yaxis: axis("y (mm)", [0, scan.size_mm[1]]),
       zaxis: axis("z (mm)", [0, scan.range_mm[1] + 5]),
-      camera: { eye: { x: -0.9, y: -1.35, z: 0.95 } },
+      camera: { eye: { x: -1.05, y: -1.6, z: 1.1 } },
     },
   }, { responsive: true, displaylogo: false, displayModeBar: false });
 }
