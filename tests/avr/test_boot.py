@@ -37,6 +37,12 @@ def test_no_servo_moves_at_power_on(uno: Uno) -> None:
     assert uno.edges() == []
 
 
+def test_the_first_servo_frame_is_no_longer_than_the_others(driver: Driver) -> None:
+    """It took 53 ms: its handler waited for edges that were over."""
+    driver.session.run_for(40_000)
+    assert driver.frame_zero_us < 5_000
+
+
 def test_a_reset_ends_the_pulses_and_keeps_the_pose(driver: Driver) -> None:
     driver.enable(POSE)
     driver.session.run_for(100_000)

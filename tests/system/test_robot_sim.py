@@ -118,6 +118,9 @@ def test_the_place_of_a_contact_is_known_within_its_stated_uncertainty() -> None
         assert abs(contact.pressure_change_hpa) >= 15.0
         # From the side the filament only bends: a few millimetres until the pressure is there.
         assert abs(contact.time_us - touching.time_us) < 100_000
+        threshold_hpa = contact.baseline_hpa + made.robot.config.bristle.threshold_hpa
+        pressed = next(truth for truth in truths if truth.pressure_hpa > threshold_hpa)
+        assert abs(contact.time_us - pressed.time_us) < 40_000
 
 
 def test_the_robot_tells_the_pose_that_was_commanded() -> None:

@@ -342,7 +342,7 @@ class Pair {
           return false;
         board.switch_open = !board.switch_open;
         rig.hal.set_stop_switch(board.switch_open);
-        for (int polls = 0; polls < 10; ++polls)
+        for (int polls = 0; polls < 20; ++polls)
           rig.poll();
         if (board.switch_open)
           model::board_switched_off(&board);

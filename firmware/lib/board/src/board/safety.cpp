@@ -11,8 +11,9 @@ using protocol::TripCause;
 
 namespace {
 
-// The stop switch's: 0.2 ms at least, which a servo's spark does not last.
-constexpr uint8_t kOpenPolls = 4;
+// The stop switch's: 0.2 ms at least, which a servo's spark does not last. An idle loop turns in
+// 15 us.
+constexpr uint8_t kOpenPolls = 14;
 
 constexpr Fault fault_of(Sensor sensor) {
   return static_cast<Fault>(sensor);

@@ -98,8 +98,7 @@ void begin() {
     TCNT2 = 0;
     TCCR1B = _BV(CS11);  // 16 MHz / 8
     TCCR2B = _BV(CS21);
-    current->rise1 = kLower1;
-    current->rise2 = kLower2;
+    set(Pulses{}, 0);  // falls in the past would come a timer's turn later
     OCR1A = kFrameTicks;
     TIFR1 = _BV(OCF1A);
     TIMSK1 = _BV(OCIE1A);

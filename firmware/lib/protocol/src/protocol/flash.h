@@ -20,7 +20,8 @@ namespace protocol {
 SETAE_HOT uint8_t next_byte(const uint8_t*& from) {
 #ifdef __AVR__
   uint8_t byte;
-  asm volatile("ld %0, %a1+" : "=r"(byte), "+x"(from));
+  // The last operand: what was stored there must be, before.
+  asm volatile("ld %0, %a1+" : "=r"(byte), "+x"(from) : "m"(*from));
   return byte;
 #else
   return *from++;
