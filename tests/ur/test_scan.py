@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import threading
 
 import numpy as np
 import pytest
@@ -13,12 +12,13 @@ from setae import rig
 from setae.cli import main
 from setae.config import Config, load
 from setae.errors import ArmBoxError, ArmFrozenError
-from setae.experiments.events import Event
 from setae.experiments.scan import scan, simulate
+from setae.link.events import Event
 from setae.objects import ScanObject, TableScene, table_scene
 from setae_protocol.messages import State
 
 ARM_TIMEOUT_S = 120.0  # a busy machine
+ON_THE_WAY_MM = 3.0
 
 
 def quick() -> tuple[Config, TableScene]:
@@ -46,16 +46,18 @@ def test_a_scan_on_the_arm_finds_what_one_in_the_simulator_finds(fake: FakeContr
 
 def test_an_arm_that_freezes_in_a_step_stops_the_robot(fake: FakeController) -> None:
     config, scene = quick()
-
-    def on_event(event: Event) -> None:
-        if event.name == "step":
-            threading.Timer(0.2, fake.freeze).start()
-
     with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
         opened.robot.enable()
+
+        def on_the_way(_: Event) -> None:
+            if opened.stage.moving and opened.stage.position_mm[0] > ON_THE_WAY_MM:
+                fake.freeze()
+
+        opened.robot.session.subscribe(on_the_way)
         with pytest.raises(ArmFrozenError):
-            scan(opened.robot, opened.stage, on_event=on_event, arm_timeout_s=ARM_TIMEOUT_S)
+            scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
         assert opened.robot.state is State.STOPPED
+        assert ON_THE_WAY_MM < opened.stage.position_mm[0] < config.scan.step_mm
 
 
 def test_a_corner_outside_of_the_box_is_told_before_anything_moves(fake: FakeController) -> None:
