@@ -37,7 +37,6 @@ class Run:
 def run(shape: str, mode: Mode) -> Run:
     config = load()
     scene = table_scene(config, random_object(shape, OBJECT_SEED))
-    lowest_mm = -(config.scan_lengths_mm[1] + config.geometry.tip_offset_mm)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "scan.mcap"
         start_s, start_cpu_s = time.perf_counter(), time.process_time()
@@ -50,7 +49,7 @@ def run(shape: str, mode: Mode) -> Run:
         robot_s=result.duration_s,
         wall_s=wall_s,
         cpu_s=cpu_s,
-        quality=quality(result, surface, lowest_mm),
+        quality=quality(result, surface, config.scan_reach_mm),
     )
 
 

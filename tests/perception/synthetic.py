@@ -11,7 +11,7 @@ from setae.perception.measures import away_from_edges
 from setae.perception.surface import height_mm
 
 CONFIG = load()
-REACH_MM = -(CONFIG.geometry.free_length_mm + CONFIG.geometry.tip_offset_mm)
+REACH_MM = CONFIG.scan_reach_mm
 
 
 def felt(

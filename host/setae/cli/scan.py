@@ -21,7 +21,7 @@ from setae.cli.arm import show_arm_targets
 from setae.cli.common import Flag, Where, app, console, interrupts, new_folder
 from setae.cli.live_map import LiveMap
 from setae.cli.runs import ended_early, make_way, say, what_is_left, write_report
-from setae.config import Config, loads
+from setae.config import Config
 from setae.errors import InputError, LogError
 from setae.experiments import scan as scans
 from setae.experiments.scan import Mode, ScanResult
@@ -238,7 +238,7 @@ def _resumed(path: Path, where: Where) -> tuple[list[_Job], Callable[[], Path]]:
     else:
         raise InputError(f"The scan in {path} is complete.", "`setae report` makes its report.")
     about = parts[0].metadata
-    config = loads(str(about.get("config", "")), source=str(parts[0].path))
+    config = parts[0].config
     simulated = bool(about.get("simulated"))
     if simulated and where.port is not None:
         raise InputError("That scan was simulated, so --port has no part in it.", "Leave it out.")
@@ -386,8 +386,7 @@ def _name(scene: TableScene) -> str:
 
 def _print_table(results: Sequence[ScanResult], config: Config) -> None:
     table_mm = results[0].scene.get("table_z_mm")
-    extended_mm = config.scan_lengths_mm[1] + config.geometry.tip_offset_mm
-    base_mm = -extended_mm if table_mm is None else float(table_mm)
+    base_mm = config.scan_reach_mm if table_mm is None else float(table_mm)
     above = "extended tip" if table_mm is None else "table"
     table = Table(caption=f"highest: above the {above}")
     table.add_column("mode")

@@ -313,6 +313,11 @@ class Config:
             self.scan.extended_length_mm or self.geometry.free_length_mm,
         )
 
+    @property
+    def scan_reach_mm(self) -> float:
+        """Height of the extended tip in a scan, z of the world: what is lower is out of reach."""
+        return -(self.scan_lengths_mm[1] + self.geometry.tip_offset_mm)
+
     def to_toml(self) -> str:
         """The whole configuration as TOML, for logs: `loads` reads it back."""
         lines: list[str] = []

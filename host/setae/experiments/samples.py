@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from setae import record
-from setae.config import Config, load
+from setae.config import load
 from setae.errors import InputError, LogError, SetaeError
 from setae.experiments import scan
 from setae.experiments.study.conducting import RUNS
 from setae.experiments.study.one import MAP
 from setae.heightmap import HeightMap
-from setae.objects import ScanObject, TableScene
+from setae.objects import ScanObject, TableScene, of_description
 from setae.perception import maps
 from setae.record import Log
 from setae.solids import Solid
@@ -128,7 +128,7 @@ def _of_map(path: Path) -> Sample:
         name=path.stem,
         label=None,
         heights=maps.read(path),
-        reach_mm=_reach_mm(load()),
+        reach_mm=load().scan_reach_mm,
         scene=None,
         origin=f"from {path.name}",
     )
@@ -157,7 +157,7 @@ def _of_parts(logs: Sequence[Log], name: str) -> Sample:
         name=name,
         label=scene.object.shape if scene and scene.object else None,
         heights=result.height_map,
-        reach_mm=_reach_mm(config),
+        reach_mm=config.scan_reach_mm,
         scene=scene,
         origin=origin,
     )
@@ -168,12 +168,8 @@ def _scene(data: Mapping[str, Any]) -> TableScene | None:
     if "table_z_mm" not in data:
         return None
     try:
-        what = data.get("object")
-        return TableScene(
-            table_z_mm=float(data["table_z_mm"]),
-            object=None if what is None else ScanObject(**what),
-        )
-    except (TypeError, ValueError, SetaeError):
+        return of_description(data)
+    except SetaeError:
         return None
 
 
@@ -216,7 +212,3 @@ def _of_run(folder: Path) -> Sample:
         scene=scene,
         origin=f"simulated, plant {plant}, mode {row.get('mode')}",
     )
-
-
-def _reach_mm(config: Config) -> float:
-    return -(config.scan_lengths_mm[1] + config.geometry.tip_offset_mm)

@@ -49,11 +49,6 @@ class PointCloud:
         object.__setattr__(self, "points_mm", points)
         object.__setattr__(self, "mark", mark)
 
-    def centred_mm(self) -> FloatArray:
-        """The points with their mean at the origin, (N, 3)."""
-        points = self.points_mm
-        return np.asarray(points - points.mean(axis=0)) if len(points) else points
-
 
 def of_map(heights: HeightMap) -> PointCloud:
     """Return the touched points of a height map."""

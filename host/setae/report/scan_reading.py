@@ -6,16 +6,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from setae.config import Config, loads
+from setae.arc import FloatArray
+from setae.config import Config
 from setae.experiments.scan import ScanResult, read_parts, scans_of
 from setae.experiments.scan.quality import Quality, Surface, quality, surface_of
 from setae.record import Log
 
 __all__ = ["Scan", "Trace", "origin_note", "read_scans"]
-
-Floats = NDArray[np.float64]
 
 _ORDER = ("paper", "safe", "adaptive")
 
@@ -32,8 +30,8 @@ class Trace:
         (n,) or (n, k).
     """
 
-    time_s: Floats
-    value: Floats
+    time_s: FloatArray
+    value: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +61,7 @@ class Scan:
     quality: Quality | None
     path: Trace
     pressure: Trace
-    place_s: Floats
+    place_s: FloatArray
     step_contacts: Trace
     problem: str
     config: Config
@@ -78,7 +76,7 @@ class Scan:
     @property
     def lowest_mm(self) -> float:
         """Height of the extended bristle's tip."""
-        return -(self.config.scan_lengths_mm[1] + self.config.geometry.tip_offset_mm)
+        return self.config.scan_reach_mm
 
     @property
     def above(self) -> str:
@@ -111,8 +109,8 @@ def origin_note(scans: Sequence[Scan]) -> str:
 
 def _scan(parts: Sequence[Log]) -> Scan:
     result = read_parts(parts)
-    config = loads(str(parts[0].metadata.get("config", "")), source=str(parts[0].path))
-    traces: dict[str, list[Floats]] = {name: [] for name in ("path", "pressure", "contacts")}
+    config = parts[0].config
+    traces: dict[str, list[FloatArray]] = {name: [] for name in ("path", "pressure", "contacts")}
     place_s: list[float] = []
     begin_s = 0.0
     for log in parts:
@@ -138,11 +136,10 @@ def _scan(parts: Sequence[Log]) -> Scan:
     if reason.startswith("KeyboardInterrupt"):
         reason = "somebody ended it with Ctrl-C"
     surface = surface_of(parts[0])
-    tip_mm = -(config.scan_lengths_mm[1] + config.geometry.tip_offset_mm)
     return Scan(
         result=result,
         surface=surface,
-        quality=quality(result, surface, tip_mm) if surface else None,
+        quality=quality(result, surface, config.scan_reach_mm) if surface else None,
         path=_trace(traces["path"], 3),
         pressure=_trace(traces["pressure"], 1),
         place_s=np.array(place_s),
@@ -153,6 +150,6 @@ def _scan(parts: Sequence[Log]) -> Scan:
     )
 
 
-def _trace(parts: Sequence[Floats], width: int) -> Trace:
+def _trace(parts: Sequence[FloatArray], width: int) -> Trace:
     together = np.concatenate([np.empty((0, width + 1)), *parts])
     return Trace(time_s=together[:, 0], value=together[:, 1:])

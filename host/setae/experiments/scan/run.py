@@ -265,9 +265,8 @@ def in_scene(config: Config, scene: TableScene) -> Config:
     >>> in_scene(config, table_scene(config, ScanObject(shape="eraser"))).scan.tallest_mm
     29.0
     """
-    tip_mm = -(config.scan_lengths_mm[1] + config.geometry.tip_offset_mm)
     top_mm = scene.table_z_mm + (scene.object.height_mm if scene.object else 0.0)
-    tallest_mm = max(0.0, round(top_mm - tip_mm, 6))
+    tallest_mm = max(0.0, round(top_mm - config.scan_reach_mm, 6))
     return dataclasses.replace(config, scan=dataclasses.replace(config.scan, tallest_mm=tallest_mm))
 
 

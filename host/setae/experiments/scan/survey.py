@@ -144,11 +144,6 @@ class Survey:
         """What is known of a place."""
         return self._known.get(cell)
 
-    def mark(self, cell: Cell) -> str:
-        """Mark of a place, ``unvisited`` where nothing is known."""
-        place = self._known.get(cell)
-        return place.mark if place else "unvisited"
-
     def height_mm(self, cell: Cell) -> float:
         """Height of a place; NaN where it has none, or nothing is known."""
         place = self._known.get(cell)

@@ -91,7 +91,7 @@ def _scanned(run: Run) -> Outcome:
         files = {MAP: maps.as_bytes(heights)}
         if log is not None:
             files[LOG] = log.read_bytes()
-    reach_mm = -(config.scan_lengths_mm[1] + config.geometry.tip_offset_mm)
+    reach_mm = config.scan_reach_mm
     near = measures.nearness(heights, scene.solids, reach_mm=reach_mm)
     row: dict[str, Any] = {
         "robot_s": round(result.duration_s, 3),
