@@ -172,6 +172,34 @@ def test_a_bent_bristle_comes_free_though_it_presses_hard() -> None:
     assert np.isfinite(result.height_map.height_mm[:, 2]).all()
 
 
+@pytest.mark.parametrize("coarse_threshold_hpa", [17.0, 30.0])
+def test_a_retraction_that_the_bristle_stopped_is_ended_before_anything_else(
+    coarse_threshold_hpa: float,
+) -> None:
+    # The board's own retraction ended early, because the bent bristle pressed harder than an
+    # unguarded motion may. The paper's scan took the robot for short, found itself in touch
+    # where it wanted to extend, and ended in an AssertionError.
+    config = coarse(4)
+    bristle = dataclasses.replace(config.bristle, coarse_threshold_hpa=coarse_threshold_hpa)
+    config = dataclasses.replace(config, bristle=bristle)
+    scene = wall(45.0, top_mm=-105.0, thick_mm=30.0)
+    events: list[Event] = []
+    with rig.open("sim://", config=config, scene=scene) as opened:
+        opened.robot.enable()
+
+        def on_event(event: Event) -> None:
+            events.append(event)
+            if event.name == "place" and event.data["mark"] in TOUCHED:
+                assert opened.robot.position_mm[2] == pytest.approx(20, abs=0.1)
+
+        result = scan(opened.robot, opened.stage, on_event=on_event)
+    assert result.complete
+    assert np.isfinite(result.height_map.height_mm[:, 2]).all()
+    names = [event.name for event in events]
+    assert "step_contact" in names
+    assert "in_touch" not in names
+
+
 def test_what_is_touched_beside_a_place_and_not_at_it_is_lost() -> None:
     # A thin wall between two columns: the steps run into it, the extensions miss it.
     config = coarse(2)

@@ -169,7 +169,8 @@ class _Tracer:
             hasty = True
             steps.retract()
             feeling = steps.go_and_feel(*place_mm, near_mm=0.0)
-            assert feeling is not None, "a short robot that touches something raises"
+            if feeling is None:
+                raise steps.too_high()
         if hasty and feeling.contact is not None:
             # Touched in haste: measure it.
             steps.lower(steps.length_over_mm(feeling.height_mm))

@@ -43,9 +43,11 @@ def safe(steps: Steps, survey: Survey, order: str, found: Found) -> None:
 
 
 def feel_short(steps: Steps) -> Feeling:
-    """Extend; where the bristle was in touch before, that made the robot short: then again."""
-    feeling = steps.feel() or steps.feel()
-    assert feeling is not None, "a refusal of the short robot is an error"
+    """Extend from the shortest."""
+    steps.retract()
+    feeling = steps.feel()
+    if feeling is None:
+        raise steps.too_high()
     return feeling
 
 

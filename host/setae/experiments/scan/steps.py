@@ -179,6 +179,13 @@ class Steps:
                     raise
                 self._robot.resume()
 
+    def _end_retraction(self, length_mm: float) -> None:
+        """After a contact: the board's own retraction ends early where the bristle presses harder.
+
+        What follows takes the robot for as short as it was told to get.
+        """
+        self.retract(max(length_mm, self.short_mm))
+
     def lower(self, length_mm: float) -> None:
         """Extend to a length that is known to be free, where that saves more than it takes."""
         if length_mm - self.length_mm <= _WORTH_LOWERING_MM:
@@ -226,6 +233,7 @@ class Steps:
             return True
         if contact is not None:
             self._stopped(contact)
+            self._end_retraction(retract_mm)
         return contact is not None
 
     def feel(self, *, near_mm: float | None = None) -> Feeling | None:
@@ -273,10 +281,8 @@ class Steps:
             return moving
 
         feeling = self._feel(dataclasses.replace(approach, busy=busy, abort=abort), near_mm)
-        if not aborted:
+        if not aborted or feeling is None or feeling.contact is None:
             return feeling
-        assert feeling is not None
-        assert feeling.contact is not None, "an approach ends early by a contact"
         self._stopped(feeling.contact)
         return None
 
@@ -297,6 +303,8 @@ class Steps:
                         approach=approach,
                     )
                     approach = None
+            if contact is not None:
+                self._end_retraction(begin_mm)
         except RefusedError as refusal:
             self._in_touch(refusal)
             return None
@@ -314,7 +322,11 @@ class Steps:
     def _in_touch(self, refusal: RefusedError) -> None:
         """After a refused baseline: too little pressure for a contact, too much for none."""
         if refusal.reason == _IN_TOUCH and self.short:
-            refusal.add_note("Begin a scan where the extended bristle touches nothing.")
+            x_mm, y_mm, _ = self.position_mm
+            refusal.add_note(
+                f"That was {x_mm:.0f}, {y_mm:.0f} mm from the first place, with the robot short. "
+                "See that the bristle hangs free there, and begin where it touches nothing."
+            )
         if refusal.reason != _IN_TOUCH or self.short:
             raise refusal
         self.emit("in_touch", position_mm=list(self.position_mm), length_mm=self.length_mm)
@@ -341,14 +353,18 @@ class Steps:
             timeout_s=self._arm_timeout_s(self._stage.position_mm),
             what="the arm to come to rest",
         )
-        place_mm = self.position_mm
-        self.emit("step_contact", position_mm=list(place_mm), contact=contact_data(contact))
+        self.emit("step_contact", position_mm=list(self.position_mm), contact=contact_data(contact))
         if self._short_at_contact(contact):
-            raise HeightWindowError(
-                f"The retracted bristle touched something {place_mm[0]:.0f}, {place_mm[1]:.0f} mm "
-                "from the first place: it can't be stepped over.",
-                "Raise the arm's start, and scan anew.",
-            )
+            raise self.too_high()
+
+    def too_high(self) -> HeightWindowError:
+        """What the short robot touched, where the arm is."""
+        x_mm, y_mm, _ = self.position_mm
+        return HeightWindowError(
+            f"The retracted bristle touched something {x_mm:.0f}, {y_mm:.0f} mm from the first "
+            "place: it can't be stepped over.",
+            "Raise the arm's start, and scan anew.",
+        )
 
     def _short_at_contact(self, contact: Contact) -> bool:
         return contact.position_mm[2] - self.short_mm < _SAME_LENGTH_MM
