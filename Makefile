@@ -173,7 +173,7 @@ fuzz: .venv/.dev ## fuzz firmware and host, FUZZ_SECONDS each target; noted in t
 
 .PHONY: line-stress
 line-stress: .venv/.dev ## a million commands over a bad line, noted in tests/system/link_runs.json
-	$(BIN)/python -m tests.system.link_stress --commands 1000000 --record
+	$(BIN)/python -m tests.system.link_stress --commands 1010000 --record
 
 .PHONY: avr
 avr: .venv/.dev firmware $(AVR_LIBRARY) $(BOOTLOADER) ## the built firmware's tests, in a cycle-accurate UNO
