@@ -22,7 +22,9 @@ def test_it_is_where_the_simulator_has_it(shape: str) -> None:
     with World() as world:
         for solid in solids:
             add_solid(world, solid)
-        theirs = [world.surface_mm(a, b, bottom_mm=-300.0, top_mm=0.0) for a, b in zip(x, y)]  # noqa: B905
+        theirs = [
+            world.surface_mm(a, b, bottom_mm=-300.0, top_mm=0.0) for a, b in zip(x, y, strict=True)
+        ]
     assert ours == pytest.approx(theirs, abs=1e-3)
 
 
