@@ -28,8 +28,7 @@ __all__ = [
 
 SCALE_MIN, SCALE_MAX = 0.8, 1.2
 
-# Between the compressed tip and the tallest point, and between the extended tip and the table.
-_CLEARANCE_MM: Final = 5.0
+# Between the extended tip and the table.
 _TABLE_GAP_MM: Final = 3.0
 _TABLE_EDGE_MM: Final = 1000.0
 _TABLE_THICKNESS_MM: Final = 40.0
@@ -262,7 +261,7 @@ def table_scene(config: Config, what: ScanObject | None = None) -> TableScene:
     """Place the table as a person would who brings the arm to its start.
 
     The extended tip stays just above the table, so that only the object is touched; and the
-    arm is higher where the object is too tall for that.
+    arm is higher where the retracted tip would not clear the object otherwise.
 
     Examples
     --------
@@ -272,11 +271,12 @@ def table_scene(config: Config, what: ScanObject | None = None) -> TableScene:
     >>> table_scene(load(), ScanObject(shape="orange")).table_z_mm
     -158.0
     """
-    geometry = config.geometry
-    lowest_mm = geometry.free_length_mm + geometry.tip_offset_mm + _TABLE_GAP_MM
+    short_mm, _ = config.scan_lengths_mm
+    over_table_mm = _TABLE_GAP_MM - config.scan_reach_mm
     tallest_mm = what.height_mm if what else 0.0
-    over_object_mm = tallest_mm + geometry.min_length_mm + geometry.tip_offset_mm + _CLEARANCE_MM
-    return TableScene(table_z_mm=-max(lowest_mm, over_object_mm), object=what)
+    tip_mm = short_mm + config.geometry.tip_offset_mm
+    over_object_mm = tallest_mm + tip_mm + config.scan.clearance_mm
+    return TableScene(table_z_mm=-max(over_table_mm, over_object_mm), object=what)
 
 
 def of_description(scene: Mapping[str, Any]) -> TableScene:

@@ -51,6 +51,33 @@ def test_the_robot_reaches_the_top_but_not_the_table(shape: str, scale: float) -
             assert z_mm == pytest.approx(scene.table_z_mm, abs=1e-3), "the object is that small"
 
 
+@pytest.mark.parametrize("shape", ["eraser", "orange"])
+@pytest.mark.parametrize(
+    ("extended_mm", "retracted_mm", "clearance_mm"), [(60.0, 0.0, 5.0), (0.0, 30.0, 8.0)]
+)
+def test_the_table_goes_with_the_lengths_of_the_scan(
+    shape: str, extended_mm: float, retracted_mm: float, clearance_mm: float
+) -> None:
+    # The table stood below the robot's free length, whatever the scan extends to: a shorter
+    # extended_length_mm missed the foot of all objects.
+    config = load()
+    lengths = dataclasses.replace(
+        config.scan,
+        extended_length_mm=extended_mm,
+        retracted_length_mm=retracted_mm,
+        clearance_mm=clearance_mm,
+    )
+    config = dataclasses.replace(config, scan=lengths)
+    scene = table_scene(config, ScanObject(shape=shape))
+    assert scene.object is not None
+    over_table_mm = config.scan_reach_mm - scene.table_z_mm
+    top_mm = scene.table_z_mm + scene.object.height_mm
+    spare_mm = -(config.scan_lengths_mm[0] + config.geometry.tip_offset_mm) - top_mm
+    assert over_table_mm == pytest.approx(3.0) or spare_mm == pytest.approx(clearance_mm)
+    assert over_table_mm >= 3.0 - 1e-9
+    assert spare_mm >= clearance_mm - 1e-9
+
+
 def test_bad_objects_are_refused() -> None:
     with pytest.raises(InputError, match="no object 'apple'"):
         ScanObject(shape="apple")

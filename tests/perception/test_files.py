@@ -81,11 +81,3 @@ def test_a_map_survives_its_file(coil: HeightMap, tmp_path: Path) -> None:
     (tmp_path / "other.npz").write_bytes(b"PK")
     with pytest.raises(InputError, match="other"):
         maps.read(tmp_path / "other.npz")
-
-
-def test_a_resampled_map_takes_the_nearest_height_and_none_from_outside(coil: HeightMap) -> None:
-    finer = maps.resampled(coil, np.arange(-20.0, 220.0, 5.0), coil.y_mm)
-    assert finer.height_mm.shape == (21, 48)
-    assert (finer.mark[:, 0] == "unvisited").all()
-    back = maps.resampled(finer, coil.x_mm, coil.y_mm)
-    assert np.array_equal(back.height_mm, coil.height_mm, equal_nan=True)

@@ -25,6 +25,7 @@ from setae.experiments.scan import (
     simulate,
     true_surface,
 )
+from setae.experiments.scan.steps import Steps
 from setae.heightmap import TOUCHED
 from setae.objects import ScanObject, TableScene, table_scene
 from setae.solids import Box, Solid
@@ -156,6 +157,21 @@ def test_a_contact_in_a_step_stops_the_arm_and_the_board_retracts() -> None:
     x_mm, length_mm = where[0]
     assert 13.0 < x_mm < 45.0, "before the place it was sent to"
     assert length_mm == pytest.approx(20, abs=0.1)
+
+
+def test_the_arm_goes_to_a_place_though_the_robot_can_not_extend_further() -> None:
+    # An extended robot has no extension left to take the arm along: the place that was asked
+    # for was found empty without a move of the arm.
+    config = coarse(2)
+    with rig.open("sim://", config=config, scene=table_scene(config)) as opened:
+        opened.robot.enable()
+        steps = Steps(opened.robot, opened.stage, config)
+        assert steps.extended
+        feeling = steps.go_and_feel(STEP_MM, 0.0)
+        assert feeling is not None
+        assert feeling.mark == "empty"
+        assert steps.position_mm[0] == pytest.approx(STEP_MM, abs=0.1)
+        steps.close()
 
 
 def test_a_bent_bristle_comes_free_though_it_presses_hard() -> None:

@@ -20,8 +20,8 @@ from setae.experiments.study import Outcome, Run, conduct, perform
 
 # Nine places on the object: a tenth of a second of computing.
 SMALL = ["scan.area_mm=[20,20]", "scan.step_mm=20"]
-# So long a retracted robot can't step over anything.
-TALL = "scan.retracted_length_mm=0,60"
+# So far above what it steps over the retracted bristle can't be.
+TALL = "scan.clearance_mm=5,60"
 
 
 def plan(**options: object) -> study.Plan:
@@ -37,7 +37,7 @@ def test_a_failed_run_is_told_and_the_others_go_on(tmp_path: Path) -> None:
     runs = plan(vary=[*SMALL, TALL]).runs()
     rows = conduct(runs, tmp_path, workers=1)
     assert [row["status"] for row in rows] == ["done", "failed"]
-    assert rows[0]["scan.retracted_length_mm"] == 0
+    assert rows[0]["scan.clearance_mm"] == 5
     assert rows[0]["places"] == 4
     assert rows[0]["robot_s"] > 0
     assert "Raise the arm" in rows[1]["error"]
@@ -119,6 +119,20 @@ def test_half_written_lines_and_other_runs_do_not_count(tmp_path: Path) -> None:
     conduct(runs[:1], tmp_path, workers=1, task=quick)
     conduct(runs, tmp_path, workers=1, task=quick)
     assert done == [run.name for run in runs]
+
+
+def test_a_run_without_the_log_that_is_to_be_kept_is_done_again(tmp_path: Path) -> None:
+    # A second call with --keep-logs said that all was done, and kept none.
+    done: list[bool] = []
+
+    def quick(run: Run) -> Outcome:
+        done.append(run.keep_log)
+        files = {"scan.mcap": b"log"} if run.keep_log else {}
+        return Outcome(row={"run": run.name, "status": "done"}, files=files)
+
+    for keep_logs in (False, True, True, False):
+        conduct(plan(keep_logs=keep_logs).runs(), tmp_path, workers=1, task=quick)
+    assert done == [False, True]
 
 
 def test_the_name_of_a_run_changes_with_all_that_it_is_made_of() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import threading
 
 import pytest
 from tests.ur.controller import FakeController, patient
@@ -11,12 +10,13 @@ from tests.ur.controller import FakeController, patient
 from setae import rig
 from setae.config import Config, load
 from setae.errors import ArmFrozenError, StoppedError
-from setae.experiments.events import Event
 from setae.experiments.explore import explore
+from setae.link.events import Event
 from setae.scene import Obstacle, tube_scene
 from setae_protocol.messages import State
 
 ARM_TIMEOUT_S = 120.0  # a busy machine
+ON_THE_WAY_MM = 3.0
 
 
 def quick(step_mm: float = 40.0) -> Config:
@@ -43,15 +43,16 @@ def test_a_trial_finds_the_cube_and_brings_the_arm_back(fake: FakeController) ->
 
 def test_an_arm_that_freezes_while_it_lowers_stops_the_robot(fake: FakeController) -> None:
     config = quick()
-
-    def on_event(event: Event) -> None:
-        if event.name == "arm_lowering":
-            threading.Timer(0.3, fake.freeze).start()
-
     with rig.open("sim://", config=config, stage=fake.url) as opened:
         opened.robot.enable()
+
+        def on_the_way(_: Event) -> None:
+            if opened.stage.moving and -opened.stage.position_mm[2] > ON_THE_WAY_MM:
+                fake.freeze()
+
+        opened.robot.session.subscribe(on_the_way)
         with pytest.raises(ArmFrozenError) as caught:
-            explore(opened.robot, opened.stage, on_event=on_event, arm_timeout_s=ARM_TIMEOUT_S)
+            explore(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
         assert opened.robot.state is State.STOPPED
         assert "can't be told to stop" in "".join(caught.value.__notes__)
         with pytest.raises(StoppedError):

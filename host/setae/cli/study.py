@@ -56,7 +56,7 @@ def study(
     config
         TOML file with what differs from the paper's robot in all runs.
     keep_logs
-        Keep every run's log too: some megabytes each.
+        Keep every run's log too: some megabytes each. Runs that were done without are done again.
     workers
         Processes on this machine; the default is one for each core.
     scheduler

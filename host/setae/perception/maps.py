@@ -1,4 +1,4 @@
-"""Height maps as files, and on other grids."""
+"""Height maps as files and as points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from setae.arc import FloatArray
 from setae.errors import InputError
 from setae.heightmap import HeightMap
 
-__all__ = ["as_bytes", "known", "read", "resampled", "write"]
+__all__ = ["as_bytes", "known", "read", "write"]
 
 _FIELDS = ("x_mm", "y_mm", "height_mm", "mark")
 
@@ -72,35 +72,3 @@ def known(heights: HeightMap) -> FloatArray:
     return np.stack(
         [heights.x_mm[columns], heights.y_mm[rows], heights.height_mm[rows, columns]], axis=1
     )
-
-
-def resampled(heights: HeightMap, x_mm: FloatArray, y_mm: FloatArray) -> HeightMap:
-    """Return the map on another grid: each place takes the nearest old one's height and mark.
-
-    Nearest, and not between: the mean of a lid's height and the table's is neither.
-
-    Parameters
-    ----------
-    heights
-        The map.
-    x_mm, y_mm
-        Columns (C,) and rows (R,) of the new grid, rising. Places more than half a cell
-        outside of the old one are unvisited.
-    """
-    x_mm, y_mm = np.asarray(x_mm, dtype=float), np.asarray(y_mm, dtype=float)
-    columns, outside_x = _nearest(heights.x_mm, x_mm)
-    rows, outside_y = _nearest(heights.y_mm, y_mm)
-    outside = outside_y[:, np.newaxis] | outside_x
-    where = np.ix_(rows, columns)
-    return HeightMap(
-        x_mm=x_mm,
-        y_mm=y_mm,
-        height_mm=np.where(outside, np.nan, heights.height_mm[where]),
-        mark=np.where(outside, "unvisited", heights.mark[where]),
-    )
-
-
-def _nearest(old_mm: FloatArray, new_mm: FloatArray) -> tuple[np.ndarray, np.ndarray]:
-    distance = np.abs(new_mm[:, np.newaxis] - old_mm)
-    half = float(np.diff(old_mm).max()) / 2 if len(old_mm) > 1 else np.inf
-    return distance.argmin(axis=1), distance.min(axis=1) > half * (1 + 1e-9)

@@ -32,8 +32,8 @@ from setae.experiments.scan.run import (
     simulate,
     true_surface,
 )
-from setae.experiments.scan.steps import require_window, window_mm
 from setae.experiments.scan.survey import Place, Survey
+from setae.experiments.scan.window import require_window, window_mm
 
 __all__ = [
     "EXPERIMENT",

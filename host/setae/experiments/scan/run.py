@@ -17,8 +17,9 @@ from setae.config import Config, Scan
 from setae.errors import InputError, SetaeError
 from setae.experiments.events import OnEvent
 from setae.experiments.scan import adaptive, cycles
-from setae.experiments.scan.steps import Feeling, Steps, contact_data, require_window
+from setae.experiments.scan.steps import Feeling, Steps, contact_data
 from setae.experiments.scan.survey import Cell, Place, Survey
+from setae.experiments.scan.window import require_window
 from setae.heightmap import HeightMap
 from setae.objects import TableScene
 from setae.record import Recorder

@@ -7,16 +7,13 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from setae import kinematics, workspace
 from setae.config import Config
 from setae.contact import Contact
 from setae.errors import HeightWindowError, RefusedError, TrippedError
 from setae.experiments.events import Event, OnEvent
-from setae.link.events import Event as LinkEvent
-from setae.link.events import TelemetryReceived
+from setae.experiments.scan.pressure import PressureWatch
 from setae.robot import Approach, Robot
 from setae.stage import Stage, move_timeout_s
-from setae_protocol.messages import PRESSURE_LSB_PER_HPA, Guard
 
 # A contact so soon after an extension's start was there before it.
 _AT_ONCE_MM = 2.5
@@ -47,47 +44,6 @@ class Feeling:
     mark: str
     height_mm: float
     contact: Contact | None
-
-
-def window_mm(config: Config) -> float:
-    """How far above the extended bristle's tip something may rise, to be stepped over.
-
-    Examples
-    --------
-    >>> from setae.config import load
-    >>> window_mm(load())
-    45.0
-    """
-    short_mm, long_mm = config.scan_lengths_mm
-    return long_mm - short_mm - config.scan.clearance_mm
-
-
-def require_window(config: Config, tallest_mm: float) -> None:
-    """Refuse a scan whose retracted bristle would not clear what is there.
-
-    Parameters
-    ----------
-    tallest_mm
-        Of what is scanned, above the extended bristle's tip.
-
-    Raises
-    ------
-    HeightWindowError
-        It is too tall.
-    UnreachableError
-        The robot can't take a length of the scan.
-    """
-    for length_mm in config.scan_lengths_mm:
-        workspace.require(kinematics.inverse((0.0, 0.0, length_mm)), config)
-    too_much_mm = tallest_mm - window_mm(config)
-    if too_much_mm > 1e-6:
-        raise HeightWindowError(
-            f"What is scanned rises {tallest_mm:g} mm above the extended bristle's tip; the "
-            f"retracted one clears {window_mm(config):g} mm with {config.scan.clearance_mm:g} mm "
-            "to spare.",
-            f"Raise the arm's start by {too_much_mm:.3g} mm, or give a smaller clearance_mm in "
-            "[scan].",
-        )
 
 
 class Steps:
@@ -121,7 +77,7 @@ class Steps:
         self._fixed_arm_timeout_s = arm_timeout_s
         self._origin_mm = stage.position_mm
         self.short_mm, self.long_mm = config.scan_lengths_mm
-        self._watch = _PressureWatch()
+        self._watch = PressureWatch()
         self._unsubscribe = robot.session.subscribe(self._watch.take)
 
     def close(self) -> None:
@@ -239,7 +195,8 @@ class Steps:
     def feel(self, *, near_mm: float | None = None) -> Feeling | None:
         """Extend to the full length or the first contact.
 
-        After a contact the robot is as long as before, otherwise extended.
+        After a contact the robot is as long as before, otherwise extended. Extended already, it
+        feels nothing further.
 
         Parameters
         ----------
@@ -266,6 +223,8 @@ class Steps:
         """
         if self._is_here(x_mm, y_mm):
             return self._feel(None, near_mm)
+        if self.extended:  # no extension would take the arm along
+            return None if self.go(x_mm, y_mm) else self._feel(None, near_mm)
         aborted = False
         approach = self._approach(x_mm, y_mm)
 
@@ -386,33 +345,6 @@ class Steps:
         if self._fixed_arm_timeout_s is not None:
             return self._fixed_arm_timeout_s
         return move_timeout_s(self._robot.config.stage, self._stage.position_mm, target_mm)
-
-
-class _PressureWatch:
-    """Notices pressure that rose and fell back while the board watched: a bristle that slid off."""
-
-    def __init__(self) -> None:
-        self._highest_hpa = 0.0
-        self._fell_hpa = 0.0
-
-    def begin(self) -> None:
-        self._highest_hpa = self._fell_hpa = 0.0
-
-    def fell_hpa(self) -> float:
-        """Largest fall of the pressure's change since `begin`."""
-        return self._fell_hpa
-
-    def take(self, event: LinkEvent) -> None:
-        if not isinstance(event, TelemetryReceived):
-            return
-        telemetry = event.telemetry
-        if telemetry.guard is not Guard.ARMED:
-            return
-        # The newest comes last.
-        for sample in telemetry.samples[: telemetry.sample_count]:
-            change_hpa = abs(sample.pressure_raw - telemetry.baseline_raw) / PRESSURE_LSB_PER_HPA
-            self._highest_hpa = max(self._highest_hpa, change_hpa)
-            self._fell_hpa = max(self._fell_hpa, self._highest_hpa - change_hpa)
 
 
 def contact_data(contact: Contact) -> dict[str, Any]:

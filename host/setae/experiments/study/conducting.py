@@ -15,7 +15,7 @@ from typing import Any, Final, TypeAlias
 
 from setae import extras
 from setae.errors import InputError, SetaeError
-from setae.experiments.study.one import Outcome, perform
+from setae.experiments.study.one import LOG, Outcome, perform
 from setae.experiments.study.plan import Run
 
 __all__ = ["RUNS", "Row", "conduct", "finished", "require"]
@@ -26,6 +26,14 @@ Row: TypeAlias = Mapping[str, Any]
 RUNS: Final = "runs"
 _ROW: Final = "row.json"
 _CONNECT_S: Final = 10
+# Of workers on this machine: a sampling profiler that nobody reads, and looks at the loop and the
+# memory many times a second, would take a twelfth of the cores from runs of many seconds.
+_FEW_LOOKS: Final = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "2s",
+    "distributed.worker.memory.monitor-interval": "1s",
+}
 
 
 def require() -> None:
@@ -56,7 +64,8 @@ def conduct(
     runs
         All runs of the study.
     folder
-        Where they are kept; runs that are done there are left out, failed ones are tried again.
+        Where they are kept; runs that are done there are left out, failed ones are tried again,
+        and so are those whose log is to be kept now and was not.
     workers
         Processes on this machine; 1: this one. None: one for each core that it may use.
     scheduler
@@ -104,7 +113,9 @@ def _ignore(row: Row) -> None:
 
 
 def finished(folder: Path, run: Run) -> Row | None:
-    """Line of a run that is done; None where it isn't, or has failed."""
+    """Line of a run that is done; None where it isn't, has failed, or lacks a log to be kept."""
+    if run.keep_log and not (folder / RUNS / run.name / LOG).is_file():
+        return None
     try:
         row = json.loads((folder / RUNS / run.name / _ROW).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -141,8 +152,10 @@ def _distributed(
     runs: Sequence[Run], workers: int, scheduler: str | None, task: Callable[[Run], Outcome]
 ) -> Iterator[tuple[Run, Outcome]]:
     distributed = extras.load("distributed", "study", "More than one worker")
+    dask_config = extras.load("dask.config", "study", "More than one worker")
     with ExitStack() as stack:
         if scheduler is None:
+            stack.enter_context(dask_config.set(_FEW_LOOKS))
             # Only this machine can reach it, it has no pages, and any free ports will do: studies
             # run beside each other.
             cluster = stack.enter_context(
