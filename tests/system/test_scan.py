@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import io
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from setae import record, report, rig
-from setae.cli import main
+from setae.cli import live_map, main
 from setae.config import Config, load
 from setae.errors import HeightWindowError, InputError, LogError
 from setae.experiments.events import Event
@@ -28,7 +31,7 @@ from setae.experiments.scan import (
 from setae.experiments.scan.steps import Steps
 from setae.heightmap import TOUCHED
 from setae.objects import ScanObject, TableScene, table_scene
-from setae.solids import Box, Solid
+from setae.solids import Box, Ellipsoid, Solid
 from setae_protocol.messages import State
 
 STEP_MM = 20.0
@@ -257,6 +260,27 @@ def test_a_contact_at_the_very_start_of_an_extension_is_flagged() -> None:
     assert result.height_map.mark.tolist() == [["empty", "double"]] * 2
 
 
+@pytest.mark.parametrize(("slip_hpa", "mark"), [(8.0, "felt"), (2.0, "slipped")])
+def test_pressure_that_falls_back_before_the_contact_is_a_slip(slip_hpa: float, mark: str) -> None:
+    # The bristle slides down a ball's flank, by 3 hPa, before it rests on what the ball lies in.
+    config = coarse(2, area_mm=(12.0, 0.0), step_mm=12.0, slip_hpa=slip_hpa)
+    ball = Ellipsoid(centre_mm=(35.0, 0.0, -135.0), semi_axes_mm=(25.0, 25.0, 25.0), yaw_rad=0.0)
+    floor = Box(centre_mm=(35.0, 0.0, -145.0), edges_mm=(60.0, 400.0, 30.0), yaw_rad=0.0)
+    with rig.open("sim://", config=config, scene=Blocks((ball, floor))) as opened:
+        opened.robot.enable()
+        result = scan(opened.robot, opened.stage, mode="safe")
+    assert result.height_map.mark.tolist() == [["empty", mark]]
+    assert result.height_map.height_mm[0, 1] == pytest.approx(-130.0, abs=HEIGHT_ERROR_MM)
+
+
+def test_rows_go_to_and_fro_or_all_the_same_way() -> None:
+    ways = {"zigzag": [0, 1, 1, 0], "raster": [0, 1, 0, 1]}
+    for order, columns in ways.items():
+        config = coarse(2, order=order)
+        result = simulate(config, table_scene(config), mode="safe")
+        assert [place.cell[0] for place in result.places] == columns
+
+
 def test_an_aborted_scan_goes_on_from_its_own_log_to_the_same_map(tmp_path: Path) -> None:
     config = coarse(3)
     scene = table_scene(config, eraser_at(40.0))
@@ -343,6 +367,7 @@ def test_the_command_scans_in_two_modes_and_reports_them_side_by_side(
         "--mode", "paper", "--mode", "adaptive", "--out", str(out),
     )  # fmt: skip
     printed = capsys.readouterr().out
+    assert re.search(r" 50%  4 of 8 places, .* robot time, about \d+:\d\d left", printed)
     assert "100%  8 of 8 places" in printed
     assert "adaptive" in printed
     assert sorted(path.name for path in out.glob("*.mcap")) == ["adaptive.mcap", "paper.mcap"]
@@ -381,6 +406,24 @@ def test_bad_input_is_told_in_one_line(
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
+
+
+def test_the_map_grows_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = io.StringIO()
+    terminal = Console(file=screen, force_terminal=True, width=100)
+    monkeypatch.setattr(live_map, "console", terminal)
+    monkeypatch.setattr(live_map, "_REDRAW_S", 0.0)
+    with live_map.LiveMap() as live:
+        live.event(Event(time_us=0, name="scan_start", data={"columns": 2, "rows": 1, "known": 0}))
+        for column, mark, height_mm in ((0, "lost", None), (1, "felt", -100.0)):
+            place = {"column": column, "row": 0, "x_mm": 10.0 * column, "y_mm": 0.0, "mark": mark,
+                     "height_mm": height_mm, "uncertainty_mm": None}  # fmt: skip
+            known = {"known": column + 1, "total": 2}
+            live.event(Event(time_us=5_000_000, name="place", data={**place, **known}))
+    drawn = screen.getvalue()
+    assert "50%  1 of 2 places, 0 touched, 0:05 robot time, about 0:05 left" in drawn
+    assert "100%  2 of 2 places, 1 touched" in drawn
+    assert "L " in drawn, "a lost contact is flagged"
 
 
 def test_a_real_robot_has_no_object(capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,8 +14,8 @@ from rich.table import Table
 
 from setae import rig
 from setae.cli.arm import show_arm_targets
-from setae.cli.common import Flag, Where, app, console, interrupts, new_folder
-from setae.cli.runs import ended_early, make_way, say, what_is_left, write_report
+from setae.cli.common import Where, app, console, interrupts, new_folder
+from setae.cli.runs import RunOptions, ended_early, make_way, say, what_is_left, write_report
 from setae.config import Config
 from setae.errors import InputError
 from setae.experiments.descent import (
@@ -38,12 +38,7 @@ def explore(
     obstacle: Annotated[list[str] | None, Parameter(negative="")] = None,
     azimuth: float = 0.0,
     trials: Literal["paper"] | None = None,
-    out: Path | None = None,
-    force: Flag = False,
-    report: bool = True,
-    accept_jump: Flag = False,
-    stage: str | None = None,
-    dry_run: Flag = False,
+    run: RunOptions | None = None,
     where: Where | None = None,
 ) -> None:
     """Explore a tube: step down, feel in eight directions, stop at an obstacle.
@@ -61,37 +56,25 @@ def explore(
         Direction of the cube, as angle α of frame D, in degrees.
     trials
         "paper": the five trials of the paper.
-    out
-        Folder for logs and report; the default is the next free runs/explore-N.
-    force
-        Use --out though it holds files; logs of the same names are replaced.
-    report
-        Write the report.
-    accept_jump
-        Enable the servos though nobody knows where they are, or they were left where the
-        configuration doesn't allow them: the first pulse may move them at full speed.
-    stage
-        The arm that carries the robot: ur://ADDRESS. Without it a simulated robot has a
-        simulated arm, and a real one a person who moves it.
-    dry_run
-        Connect to the arm, show where it would go, and move nothing.
+    run
+        What it writes, and the arm.
     where
         Which robot.
     """
-    where = where or Where()
+    run, where = run or RunOptions(), where or Where()
     config = where.load()
     obstacles = _obstacles(config, obstacle, azimuth, trials)
-    by_hand = stage is None and not where.simulated
+    by_hand = run.stage is None and not where.simulated
     targets_mm(config)  # what the robot can't reach is told before anything begins
-    if dry_run:
-        show_arm_targets(stage, config, arm_targets_mm(config))
+    if run.dry_run:
+        show_arm_targets(run.stage, config, arm_targets_mm(config))
         return
     progress = _Progress(len(obstacles))
     logs: list[Path] = []
 
     @cache
     def folder() -> Path:
-        return new_folder("explore", out, force=force)
+        return new_folder("explore", run.out, force=run.force)
 
     @contextmanager
     def setup(number: int, what: Obstacle | None) -> Iterator[tuple[rig.Rig, OnEvent]]:
@@ -103,19 +86,19 @@ def explore(
                 config=config,
                 seed=where.seed + number - 1,
                 scene=tube_scene(config, what),
-                stage=ManualStage(ask=say) if by_hand else stage,
+                stage=ManualStage(ask=say) if by_hand else run.stage,
                 pollables=[interrupts],
             ) as opened,
         ):
             # Only now, so that a board that isn't there costs neither work nor a folder.
             log = folder() / f"trial-{number}.mcap"
-            if force:
+            if run.force:
                 make_way(log)
             if not where.simulated:
                 _ask_to_place(opened.robot, what, by_hand=by_hand)
             recorder = opened.record(log, metadata={"experiment": "explore", "trial": number})
             logs.append(log)
-            opened.robot.enable(accept_jump=accept_jump)
+            opened.robot.enable(accept_jump=run.accept_jump)
 
             def on_event(event: Event) -> None:
                 recorder.experiment(event.time_us, event.name, event.data)
@@ -129,7 +112,7 @@ def explore(
         )
     _print_table(results, paper=list(obstacles) == list(paper_obstacles(config)))
     say(f"Logs: {folder()}")
-    if report:
+    if run.report:
         write_report(logs, folder())
 
 

@@ -1,13 +1,47 @@
-"""What a run leaves in its folder, and what it says when it ends early."""
+"""What a run is told and leaves in its folder, and what it says when it ends early."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
-from setae.cli.common import console
+from cyclopts import Parameter
+
+from setae.cli.common import Flag, console
 from setae.errors import ExtraMissingError, LogError, SetaeError
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """What a run of robot and arm writes, and how it begins.
+
+    Parameters
+    ----------
+    out
+        Folder for logs and report; the default is the next free one in runs.
+    force
+        Use --out though it holds files; logs of the same names are replaced.
+    report
+        Write the report.
+    accept_jump
+        Enable the servos though nobody knows where they are, or they were left where the
+        configuration doesn't allow them: the first pulse may move them at full speed.
+    stage
+        The arm that carries the robot: ur://ADDRESS. Without it a simulated robot has a
+        simulated arm, and a real one a person who moves it.
+    dry_run
+        Connect to the arm, show where it would go, and move nothing.
+    """
+
+    out: Path | None = None
+    force: Flag = False
+    report: bool = True
+    accept_jump: Flag = False
+    stage: str | None = None
+    dry_run: Flag = False
 
 
 def say(text: str) -> None:

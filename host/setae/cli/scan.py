@@ -18,9 +18,9 @@ from rich.table import Table
 
 from setae import record, rig
 from setae.cli.arm import show_arm_targets
-from setae.cli.common import Flag, Where, app, console, interrupts, new_folder
+from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.cli.live_map import LiveMap
-from setae.cli.runs import ended_early, make_way, say, what_is_left, write_report
+from setae.cli.runs import RunOptions, ended_early, make_way, say, what_is_left, write_report
 from setae.config import Config
 from setae.errors import InputError, LogError
 from setae.experiments import scan as scans
@@ -47,13 +47,8 @@ def scan(
     step: float | None = None,
     order: Literal["zigzag", "raster"] | None = None,
     tallest: float | None = None,
-    out: Path | None = None,
-    force: Flag = False,
     resume: Path | None = None,
-    report: bool = True,
-    accept_jump: Flag = False,
-    stage: str | None = None,
-    dry_run: Flag = False,
+    run: RunOptions | None = None,
     where: Where | None = None,
 ) -> None:
     """Scan a surface from above: from place to place, extend until the bristle touches it.
@@ -79,28 +74,17 @@ def scan(
         Rows to and fro, or all in the same direction.
     tallest
         How far anything rises above the extended bristle's tip, in mm. The simulator knows.
-    out
-        Folder for logs and report; the default is the next free runs/scan-N.
-    force
-        Use --out though it holds files; logs of the same names are replaced.
     resume
         Folder or log of a scan that ended early: what it lacks is scanned, with its settings.
-    report
-        Write the report.
-    accept_jump
-        Enable the servos though nobody knows where they are, or they were left where the
-        configuration doesn't allow them: the first pulse may move them at full speed.
-    stage
-        The arm that carries the robot: ur://ADDRESS. Without it a simulated robot has a
-        simulated arm, and a real one a person who moves it.
-    dry_run
-        Connect to the arm, show where it would go, and move nothing.
+    run
+        What it writes, and the arm.
     where
         Which robot.
     """
-    where = where or Where()
+    run, where = run or RunOptions(), where or Where()
     if resume is not None:
-        given = (mode, object, scene, area, step, order, tallest, out, where.config, where.plant)
+        given = (mode, object, scene, area, step, order, tallest, run.out, where.config,
+                 where.plant)  # fmt: skip
         if any(value is not None for value in given):
             raise InputError(
                 "--resume goes on with the settings of the earlier run.",
@@ -110,17 +94,17 @@ def scan(
     else:
         config = _settings(where, area, step, order, tallest)
         jobs = _fresh(config, where, mode or ["paper"], object, scene)
-        folder = cache(lambda: new_folder("scan", out, force=force))
+        folder = cache(lambda: new_folder("scan", run.out, force=run.force))
     for job in jobs:
         scans.require_window(job.config, job.config.scan.tallest_mm)
         scans.Survey(job.config.scan)
-    if dry_run:
-        show_arm_targets(stage, jobs[0].config, scans.arm_targets_mm(jobs[0].config.scan))
+    if run.dry_run:
+        show_arm_targets(run.stage, jobs[0].config, scans.arm_targets_mm(jobs[0].config.scan))
         return
-    run = _Run(folder, stage, force=force, accept_jump=accept_jump)
-    run.all(jobs)
-    if report:
-        run.report()
+    scanning = _Scanning(folder, run)
+    scanning.all(jobs)
+    if run.report:
+        scanning.report()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -268,16 +252,12 @@ def _all_parts(logs: Sequence[Path]) -> list[Path]:
 # -------------------------------------------------------------------------- scanning
 
 
-class _Run:
+class _Scanning:
     """Scans one after the other, each with a log of its own in one folder."""
 
-    def __init__(
-        self, folder: Callable[[], Path], stage: str | None, *, force: bool, accept_jump: bool
-    ) -> None:
+    def __init__(self, folder: Callable[[], Path], run: RunOptions) -> None:
         self._folder = folder
-        self._stage = stage
-        self._force = force
-        self._accept_jump = accept_jump
+        self._run = run
         self._logs: list[Path] = []
 
     def all(self, jobs: Sequence[_Job]) -> None:
@@ -328,14 +308,14 @@ class _Run:
                 config=job.config,
                 seed=job.seed,
                 scene=job.scene or UnknownScene(),
-                stage=ManualStage(ask=say) if self._by_hand(job) else self._stage,
+                stage=ManualStage(ask=say) if self._by_hand(job) else self._run.stage,
                 pollables=[interrupts],
             ) as opened,
         ):
             arm_base_mm = _arm_base_mm(opened, job)
             # Only now, so that a board that isn't there costs neither work nor a folder.
             log = self._folder() / job.name
-            if self._force:
+            if self._run.force:
                 make_way(log)
             if self._by_hand(job):
                 _ask_for_start(opened.robot)
@@ -349,11 +329,11 @@ class _Run:
             self._logs.append(log)
             if opened.world is not None and job.scene is not None:
                 scans.record_true_surface(recorder, opened.world, job.scene, job.config.scan)
-            opened.robot.enable(accept_jump=self._accept_jump)
+            opened.robot.enable(accept_jump=self._run.accept_jump)
             yield opened, recorder
 
     def _by_hand(self, job: _Job) -> bool:
-        return self._stage is None and job.scene is None
+        return self._run.stage is None and job.scene is None
 
 
 def _arm_base_mm(opened: rig.Rig, job: _Job) -> tuple[float, ...] | None:

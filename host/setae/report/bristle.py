@@ -53,8 +53,8 @@ def write(
         )
     folder = Path(out)
     with files.writing(folder):
-        (folder / "pictures").mkdir(exist_ok=True)
-        drawn = picture(folder / "pictures" / "bristle.png", log)
+        pictures = files.pictures_of(folder)
+        drawn = picture(pictures / "bristle.png", log)
         (folder / page).write_text(_page(log, moves, drawn), encoding="utf-8")
         table = folder / "moves.csv"
         with table.open("w", newline="", encoding="utf-8") as file:
@@ -179,7 +179,6 @@ def _page(log: Log, moves: Sequence[Move], drawn: Path) -> str:
     return template.fill(
         "bristle.html",
         {
-            "css": template.text("page.css"),
             "badges": badge,
             "finding": html.escape(finding(moves, config.bristle.threshold_hpa)),
             "picture": template.image(drawn, "Histograms of the pressure's largest change"),

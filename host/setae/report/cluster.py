@@ -40,10 +40,10 @@ def write(found: Comparison, out: str | Path, *, page: str = "report.html") -> R
     """
     folder = Path(out)
     with files.writing(folder):
-        (folder / "pictures").mkdir(exist_ok=True)
+        pictures = files.pictures_of(folder)
         drawn = (
-            clouds_picture(folder / "pictures" / "clouds.png", found),
-            trials_picture(folder / "pictures" / "maps.png", found),
+            clouds_picture(pictures / "clouds.png", found),
+            trials_picture(pictures / "maps.png", found),
         )
         table = _csv(folder / "trials.csv", found)
         (folder / page).write_text(_page(found, drawn), encoding="utf-8")
@@ -170,7 +170,6 @@ def _page(found: Comparison, drawn: tuple[Path, ...]) -> str:
     return template.fill(
         "cluster.html",
         {
-            "css": template.text("page.css"),
             "badges": badge,
             "finding": html.escape(finding(found)),
             "clouds": template.image(drawn[0], "Point clouds and their t-SNE"),

@@ -10,7 +10,7 @@ from pathlib import Path
 from setae.errors import LogError
 from setae.record import Log
 
-__all__ = ["Report", "logs_of", "writing"]
+__all__ = ["Report", "logs_of", "pictures_of", "writing"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,3 +66,10 @@ def writing(folder: Path, what: str = "The report") -> Iterator[None]:
             f"{what} can't be written to {folder}: {error.strerror or error}.",
             "Check the folder and the room on the disk.",
         ) from error
+
+
+def pictures_of(folder: Path) -> Path:
+    """Make and return the folder for a report's pictures."""
+    pictures = folder / "pictures"
+    pictures.mkdir(exist_ok=True)
+    return pictures

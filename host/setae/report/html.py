@@ -38,7 +38,6 @@ def page(trials: Sequence[Trial]) -> str:
     edges = {trial.cube.edge_mm for trial in trials if trial.cube}
     values = {
         "title": "Feeling the way down a tube",
-        "css": template.text("page.css"),
         "badges": _badges(trials),
         "step": f"{explore.step_mm:g} mm",
         "directions": str(len(directions)),

@@ -45,7 +45,6 @@ def page(scans: Sequence[Scan], pictures: Sequence[Path]) -> str:
     return template.fill(
         "scan.html",
         {
-            "css": template.text("page.css"),
             "badges": _badges(scans),
             "step": f"{settings.step_mm:g} mm",
             "threshold": f"{scans[0].config.bristle.threshold_hpa:g} hPa",

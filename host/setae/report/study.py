@@ -54,11 +54,11 @@ def write(
     folder = Path(out)
     drawn: list[Path] = []
     with files.writing(folder):
-        (folder / "pictures").mkdir(exist_ok=True)
+        pictures = files.pictures_of(folder)
         done = [row for row in rows if row["status"] == "done"]
         if done:
-            drawn.append(measures_picture(folder / "pictures" / "measures.png", done, varied))
-            drawn.append(runs_picture(folder / "pictures" / "runs.png", done, folder))
+            drawn.append(measures_picture(pictures / "measures.png", done, varied))
+            drawn.append(runs_picture(pictures / "runs.png", done, folder))
         (folder / page).write_text(_page(rows, varied, drawn), encoding="utf-8")
     return Report(page=folder / page, pictures=tuple(drawn), tables=())
 
@@ -198,7 +198,6 @@ def _page(rows: Sequence[Row], varied: Sequence[str], drawn: Sequence[Path]) -> 
     return template.fill(
         "study.html",
         {
-            "css": template.text("page.css"),
             "badges": badges,
             "finding": f"{len(rows) - len(failed)} of {len(rows)} runs are done: {shapes} "
             f"objects, {seeds} seeds, {len({_case(row, varied) for row in rows})} combinations.",

@@ -22,8 +22,9 @@ def text(name: str) -> str:
 
 
 def fill(name: str, values: Mapping[str, str]) -> str:
-    """Fill a template with values, which are HTML already."""
-    parts = text(name).split("{{")
+    """Fill a template, below the head that all pages share, with values that are HTML already."""
+    values = {"css": text("page.css"), **values}
+    parts = (text("head.html") + text(name)).split("{{")
     filled = [parts[0]]
     for part in parts[1:]:
         key, rest = part.split("}}", 1)

@@ -44,7 +44,6 @@ def page(runs: Sequence[Run], pictures: Sequence[Path], causes: str = "") -> str
     return template.fill(
         "validation.html",
         {
-            "css": template.text("page.css"),
             "badges": _badges(runs),
             "count": str(len(runs[0].targets)),
             "finding": html.escape(finding(runs)),

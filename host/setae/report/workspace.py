@@ -302,7 +302,6 @@ def page(path: Path, config: Config, model: str, measured: Volumes) -> Path:
     """
     plotly = extras.load("plotly.offline")
     values = {
-        "css": template.text("page.css"),
         "finding": html.escape(finding(measured, model)),
         "table": _table(measured),
         "model": html.escape(model),
