@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.ur.controller import FakeController, patient
 
-from setae import rig
+from setae import record, rig
 from setae.cli import main
 from setae.config import Config, load
 from setae.errors import ArmBoxError, ArmFrozenError
-from setae.experiments.scan import scan, simulate
+from setae.experiments.scan import read, scan, simulate
 from setae.link.events import Event
 from setae.objects import ScanObject, TableScene, table_scene
+from setae.ur import UrStage
 from setae_protocol.messages import State
 
 ARM_TIMEOUT_S = 120.0  # a busy machine
@@ -32,12 +34,24 @@ def quick() -> tuple[Config, TableScene]:
     return config, table_scene(config, what)
 
 
-def test_a_scan_on_the_arm_finds_what_one_in_the_simulator_finds(fake: FakeController) -> None:
+def test_a_scan_on_the_arm_finds_what_one_in_the_simulator_finds(
+    fake: FakeController, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     config, scene = quick()
-    with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
-        opened.robot.enable()
-        result = scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
-        assert opened.stage.position_mm == pytest.approx((0, 0, 0), abs=0.3)
+    robot, table = tmp_path / "robot.toml", tmp_path / "scene.toml"
+    robot.write_text(config.to_toml())
+    table.write_text('[object]\nshape = "eraser"\nx_mm = 40.0\ny_mm = 15.0\nyaw_deg = 90.0\n')
+    monkeypatch.setattr("setae.stage._SLACK_S", ARM_TIMEOUT_S)
+    with pytest.raises(SystemExit) as ended:
+        main(["scan", "--sim", "--stage", fake.url, "--config", str(robot), "--scene", str(table),
+              "--out", str(tmp_path / "run")])  # fmt: skip
+    assert ended.value.code == 0
+    assert (tmp_path / "run" / "report.html").is_file()
+    result = read(tmp_path / "run")
+    with rig.open("sim://", config=config, stage=fake.url) as opened:
+        assert isinstance(opened.stage, UrStage)
+        start_mm = record.read(tmp_path / "run" / "paper.mcap").metadata["arm_base_mm"]
+        assert opened.stage.base_mm((0, 0, 0)) == pytest.approx(start_mm, abs=0.3), "it is back"
     simulated = simulate(config, scene)
     ours, theirs = result.height_map.height_mm, simulated.height_map.height_mm
     assert (np.isfinite(ours) == np.isfinite(theirs)).all()
