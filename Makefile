@@ -141,11 +141,13 @@ drift: .venv/.dev ## are the generated files those that the schema gives?
 
 .PHONY: firmware-test
 firmware-test: ## the firmware's unit tests, on this machine
+	@.ci/need python compiler
 	$(PIO) test -e native --json-output-path .pio/native.json
 	@$(PYTHON) .ci/count.py .pio/native.json
 
 .PHONY: firmware
 firmware: ## build the firmware for the UNO, and check its size
+	@.ci/need python
 	$(PIO) run -e uno
 	@touch .pio/build/uno/firmware.elf # PlatformIO compares contents, tests/avr times
 	@$(PYTHON) firmware/check_size.py .pio/build/uno/firmware.elf

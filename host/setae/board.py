@@ -27,6 +27,7 @@ from setae_protocol.messages import (
     PRESSURE_LSB_PER_HPA,
     SERVO_FRAME_US,
     HostMessage,
+    Refusal,
     Segment,
     State,
     Status,
@@ -37,6 +38,7 @@ from setae_protocol.messages import (
 REPLY_S = 2.0
 """What an answer may take beyond the motion itself, the link's retries included."""
 
+_AFTER_FAULT = "Then call resume(), or give `setae enable`."
 # What the board has of a motion, in servo frames: a second, which it goes on without the host.
 _AHEAD_FRAMES = 50
 
@@ -206,7 +208,7 @@ class Board:
             return
         if state is State.RELAXED:
             raise RefusedError(
-                "not_enabled", "Call enable() first.", command="the motion",
+                "not_enabled", Refusal.NOT_ENABLED.remedy, command="the motion",
                 detail="The servos have no pulses.",
             )  # fmt: skip
         if state is State.STOPPED:
@@ -219,7 +221,7 @@ class Board:
             )
         if state is State.FAULT:
             raise (
-                FaultError("unknown", "Call resume() once its cause is gone.")
+                FaultError("unknown", Refusal.FAULT.remedy)
                 if (self._last_fault is None)
                 else _fault(self._last_fault)
             )
@@ -299,15 +301,17 @@ def _fault(report: FaultReported) -> FaultError:
     detail = fault.doc
     if report.record.further:
         detail += f" {report.record.further} more came before this one was read."
-    return FaultError(name_of(fault), fault.remedy, detail=detail)
+    return FaultError(name_of(fault), f"{fault.remedy} {_AFTER_FAULT}", detail=detail)
 
 
 def _trip_error(trip: Tripped) -> TrippedError:
     record = trip.record
     change_hpa = (record.pressure_raw - record.baseline_raw) / PRESSURE_LSB_PER_HPA
     if record.cause == TripCause.DEADLINE:
-        return TrippedError("The guarded move passed its deadline and was frozen.",
-                            "Call resume(), then try again with more time.")  # fmt: skip
+        return TrippedError(
+            "The guarded move passed its deadline and was frozen.",
+            "Call resume(), or give `setae enable`, then try again with more time.",
+        )
     return TrippedError(
         f"The bristle touched something ({change_hpa:+.1f} hPa) and the robot froze."
     )

@@ -441,14 +441,14 @@ class ExtraMissingError(SetaeError):
     Parameters
     ----------
     extra
-        The extra that brings them, such as ``analysis``.
+        The extra that brings them, such as ``ur``.
     what
         What needs them.
 
     Examples
     --------
-    >>> print(ExtraMissingError("view", "The 3D view"))
-    The 3D view needs packages that aren't installed. Run: pip install 'setae[view]'
+    >>> print(ExtraMissingError("ur", "A UR arm"))
+    A UR arm needs packages that aren't installed. Run: pip install 'setae[ur]'
     """
 
     def __init__(self, extra: str, what: str = "This") -> None:

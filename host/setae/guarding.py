@@ -177,7 +177,7 @@ class Guarding:
         if trip.record.cause == TripCause.DEADLINE:
             raise DeadlineError(
                 f"The guarded move took longer than its {limit_s:.1f} s, so the board froze it.",
-                "Call resume(), then try again with more time.",
+                "Call resume(), or give `setae enable`, then try again with more time.",
             )
         return self.contact_of(trip)
 

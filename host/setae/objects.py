@@ -304,9 +304,11 @@ def of_description(scene: Mapping[str, Any]) -> TableScene:
             table_z_mm=float(scene["table_z_mm"]),
             object=None if what is None else ScanObject(**what),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError):
         raise InputError(
-            f"A scene can't be made of {dict(scene)}: {error}.",
+            f"A scene can't be made of {dict(scene)}.",
             "It needs table_z_mm, and object with shape, scale, x_mm, y_mm, yaw_deg.",
         ) from None
 

@@ -336,10 +336,10 @@ _REFUSAL_DOC: Mapping[Refusal, str] = MappingProxyType(
 _REFUSAL_REMEDY: Mapping[Refusal, str] = MappingProxyType(
     {
         Refusal.NONE: "Nothing to do.",
-        Refusal.NOT_ENABLED: "Call enable() first.",
-        Refusal.STOPPED: "Call resume() once the robot may move again.",
-        Refusal.TRIPPED: "Read the contact, then call resume().",
-        Refusal.FAULT: "Remove the fault's cause, then call resume().",
+        Refusal.NOT_ENABLED: "Call enable() first, or give `setae enable`.",
+        Refusal.STOPPED: "Once the robot may move again, call resume(), or give `setae enable`.",
+        Refusal.TRIPPED: "Read the contact, then call resume(), or give `setae enable`.",
+        Refusal.FAULT: "Remove the fault's cause, then call resume(), or give `setae enable`.",
         Refusal.BUSY: "Wait for the motion to end.",
         Refusal.OUT_OF_LIMITS: "Choose a target inside the servo's travel.",
         Refusal.PAIR_LIMIT: "Choose a target inside the workspace.",
@@ -351,9 +351,9 @@ _REFUSAL_REMEDY: Mapping[Refusal, str] = MappingProxyType(
         Refusal.SENSOR_UNAVAILABLE: "Run `setae doctor`.",
         Refusal.TARE_NOISY: "Let the robot rest before a guarded move; check the silicone bond.",
         Refusal.TARE_FAR: "Retract first; armed in contact means blind.",
-        Refusal.REFLEX_RUNNING: "Wait for it, then resume.",
+        Refusal.REFLEX_RUNNING: "Wait for it, then call resume(), or give `setae enable`.",
         Refusal.SUPPLY_LOW: "Give the servos a supply of their own, then store again.",
-        Refusal.STOP_SWITCH: "Close it, then call resume().",
+        Refusal.STOP_SWITCH: "Close it, then call resume(), or give `setae enable`.",
     }
 )
 

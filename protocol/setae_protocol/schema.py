@@ -200,10 +200,10 @@ REFUSAL = Codes(
     "Why a command was not carried out. A refused `segments` or `guard` also drops the queue and raises the epoch.",
     (
         Code("none", 0, "Not refused.", "Nothing to do."),
-        Code("not_enabled", 1, "The servos have no pulses yet.", "Call enable() first."),
-        Code("stopped", 2, "The board is stopped.", "Call resume() once the robot may move again."),
-        Code("tripped", 3, "The board is tripped.", "Read the contact, then call resume()."),
-        Code("fault", 4, "The board is in fault.", "Remove the fault's cause, then call resume()."),
+        Code("not_enabled", 1, "The servos have no pulses yet.", "Call enable() first, or give `setae enable`."),
+        Code("stopped", 2, "The board is stopped.", "Once the robot may move again, call resume(), or give `setae enable`."),
+        Code("tripped", 3, "The board is tripped.", "Read the contact, then call resume(), or give `setae enable`."),
+        Code("fault", 4, "The board is in fault.", "Remove the fault's cause, then call resume(), or give `setae enable`."),
         Code("busy", 5, "The board is moving, and this command needs it at rest.", "Wait for the motion to end."),
         Code("out_of_limits", 6, "A pulse is outside its servo's limits.", "Choose a target inside the servo's travel."),
         Code("pair_limit", 7, "The pulses of two opposite tendons would crush or over-bend the spring.", "Choose a target inside the workspace."),
@@ -215,9 +215,9 @@ REFUSAL = Codes(
         Code("sensor_unavailable", 13, "A guard needs a pressure sensor that answers.", "Run `setae doctor`."),
         Code("tare_noisy", 14, "The pressure was not steady while the baseline was taken.", "Let the robot rest before a guarded move; check the silicone bond."),
         Code("tare_far", 15, "The pressure at arming was far from its rest value: the bristle seems to be in contact already.", "Retract first; armed in contact means blind."),
-        Code("reflex_running", 16, "The reflex has not ended yet.", "Wait for it, then resume."),
+        Code("reflex_running", 16, "The reflex has not ended yet.", "Wait for it, then call resume(), or give `setae enable`."),
         Code("supply_low", 17, "The board's supply is too low to write its EEPROM.", "Give the servos a supply of their own, then store again."),
-        Code("stop_switch", 18, "The stop switch is open.", "Close it, then call resume()."),
+        Code("stop_switch", 18, "The stop switch is open.", "Close it, then call resume(), or give `setae enable`."),
     ),
 )
 

@@ -43,4 +43,4 @@ def test_messages_say_what_was_wrong_and_what_to_do() -> None:
     fault = FaultError("sensor_silent", "Check the cable.")
     assert str(fault) == "The board is in fault (sensor_silent). Check the cable."
     assert "setae flash" in str(errors.BoardSilentError("No answer."))
-    assert "pip install 'setae[view]'" in str(ExtraMissingError("view", "The 3D view"))
+    assert "pip install 'setae[ur]'" in str(ExtraMissingError("ur", "A UR arm"))

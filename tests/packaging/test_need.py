@@ -137,3 +137,27 @@ def test_anyone_else_is_told_instead(bare: Path, tmp_path: Path) -> None:
     assert status == 1
     assert "as root: apt-get install -y g++" in said
     assert not asked.exists()
+
+
+@pytest.mark.parametrize("target", ["demo", "test", "flash", "firmware", "firmware-test", "lint"])
+def test_make_names_what_is_missing_before_it_does_anything(target: str, bare: Path) -> None:
+    """The firmware's targets ended with `exec: python3: not found`."""
+    make = shutil.which("make")
+    assert make
+    for name in ("find", "sort", "cmp", "xargs", "sed"):
+        found = shutil.which(name)
+        assert found
+        (bare / name).symlink_to(found)
+    missing = bare / "no-python"
+    done = subprocess.run(
+        # The stamps are taken for older than all, as in a fresh clone.
+        [make, "--no-print-directory", "--always-make", target, f"PYTHON={missing}"],
+        cwd=ROOT,
+        env={"PATH": str(bare)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("setae: missing: ")
+    assert "no-python (3.11 or later, with venv)" in done.stderr.splitlines()[0]

@@ -205,3 +205,10 @@ def test_every_fault_and_refusal_says_what_to_do(codes: Any) -> None:
     for code in codes:
         assert code.doc.endswith(".")
         assert code.remedy.endswith(".")
+
+
+@pytest.mark.parametrize("refusal", Refusal)
+def test_what_a_program_has_to_call_a_terminal_is_told_too(refusal: Refusal) -> None:
+    """The commands passed on "call resume()", and there is no command of that name."""
+    if "resume()" in refusal.remedy or "enable()" in refusal.remedy:
+        assert "`setae enable`" in refusal.remedy

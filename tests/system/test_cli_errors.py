@@ -185,6 +185,7 @@ def test_an_unreachable_target(
         ("[geometry\n", "TOML"),
         ("[explore]\nsteps = -1\n", "steps"),
         ("[simulator]\nno_such_thing = 1.0\n", "no_such_thing"),
+        ('[simulator]\n"tendon.frictoin" = 0.1\n', "Did you mean 'tendon.friction'?"),
     ],
 )
 def test_a_broken_configuration(
@@ -206,6 +207,27 @@ def test_doctor_goes_on_after_what_is_wrong_and_exits_with_1(
     printed = capsys.readouterr().out
     assert "[motion] slew_mm_s" in printed
     assert "ok  simulator" in printed
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[object]\nshape = "ball"\n', "There is no object 'ball'. Give one of"),
+        ('[object]\nshape = "orange"\nscale = 5\n', "scale is 5. Give a number from 0.8 to 1.2."),
+        ('[object]\nshape = "orange"\ncolour = 5\n', "'colour': 5}"),
+    ],
+)
+def test_a_broken_scene(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two errors came in one line, and neither named the file."""
+    path = tmp_path / "table.toml"
+    path.write_text(text)
+    error = error_of(capsys, "scan", "--sim", "--scene", str(path), "--out", str(tmp_path / "out"))
+    assert f"setae: {path}: " in error
+    assert words in error
+    assert ".." not in error
+    assert "__init__" not in error
 
 
 def test_a_configuration_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:

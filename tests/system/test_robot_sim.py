@@ -248,7 +248,7 @@ def test_a_sensor_that_falls_silent_under_guard_is_a_fault_not_a_blind_move() ->
         made.at(start_us + 700_000, lambda: made.world.sensor_fault(SensorFault.SILENT))
         with pytest.raises(FaultError, match="sensor") as failure:
             robot.probe(TARGET_MM, duration_s=2.0)
-        assert failure.value.remedy
+        assert failure.value.remedy.endswith("Then call resume(), or give `setae enable`.")
         held = made.pulses_us()
         made.run(1.0)
         assert made.pulses_us() == pytest.approx(held)

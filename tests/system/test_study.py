@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import importlib
 import json
+import signal
 import socket
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -77,6 +79,32 @@ def test_processes_share_the_runs_and_give_what_one_gives(tmp_path: Path) -> Non
                 for folder in ("alone", "together")]  # fmt: skip
         assert maps[0].read_bytes() == maps[1].read_bytes()
     assert conduct(runs, tmp_path / "together", workers=2, task=never) == together
+
+
+def test_an_interrupt_while_the_workers_start_waits_until_they_can_be_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half-started workers, and dask that could not end them, left tracebacks."""
+    happened: list[str] = []
+
+    class Starting:
+        def __init__(self, **_: object) -> None:
+            signal.raise_signal(signal.SIGINT)
+            blocked = "import signal; print(signal.SIGINT in signal.pthread_sigmask(0, []))"
+            worker = [sys.executable, "-c", blocked]
+            happened.append(subprocess.run(worker, capture_output=True, text=True).stdout.strip())
+
+        def __enter__(self) -> object:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            happened.append("ended")
+
+    monkeypatch.setattr("distributed.LocalCluster", Starting)
+    with pytest.raises(KeyboardInterrupt):
+        conduct(plan(seeds=2).runs(), tmp_path, workers=2)
+    assert happened == ["True", "ended"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_scheduler_that_runs_elsewhere_does_the_runs(tmp_path: Path) -> None:

@@ -197,6 +197,7 @@ def test_a_real_robot_waits_for_pictures_and_is_measured_by_a_file(
         (("--sim", "--frame", "f.toml"), "--positions"),
         (("--port", "x", "--noise-mm", "1"), "simulated"),
         (("--sim", "--resume"), "--out"),
+        (("--sim", "--resume", "--out", "nothing"), "nothing holds no run"),  # it began one there
         (("--sim", "--noise-mm", "-1"), "noise"),
         (("--positions", "a.csv", "--model", "paper", "--model", "taut"), "one --model"),
         (("--positions", "a.csv", "--causes"), "--causes is for driving"),  # was passed over

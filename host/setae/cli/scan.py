@@ -202,7 +202,10 @@ def _scene(config: Config, path: Path) -> TableScene:
         ) from None
     if "table_z_mm" not in data:
         data["table_z_mm"] = table_scene(config).table_z_mm
-    found = of_description(data)
+    try:
+        found = of_description(data)
+    except InputError as error:
+        raise InputError(f"{path}: {error.problem}", error.remedy) from error
     if unknown := set(data) - {"table_z_mm", "object"}:
         raise InputError(
             f"The scene {path} has no {sorted(unknown)[0]!r}.", "It has table_z_mm and [object]."

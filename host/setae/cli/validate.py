@@ -167,9 +167,11 @@ class _Drive:
 
     def all(self, models: Sequence[str], targets: Sequence[Target], *, accept_jump: bool) -> Path:
         """Run every model; the folder with the logs."""
+        before = self._before() if self._resume else ()
         with ended_early(self._what_is_left, what="the robot is stopped"):
             for model in models:
-                left = [target for target in targets if target.label not in self._done(model)]
+                done = self._done(model, before)
+                left = [target for target in targets if target.label not in done]
                 if left:
                     self._one(model, left, accept_jump=accept_jump)
                 else:
@@ -187,11 +189,20 @@ class _Drive:
             self._folder = new_folder("validate", self._out, force=self._force or self._resume)
         return self._folder
 
-    def _done(self, model: str) -> set[str]:
-        if not self._resume:
-            return set()
-        read = [record.read(log) for log in sorted(self._where_to().glob("*.mcap"))]
-        for run in runs.read(runs.of_kind(read, runs.EXPERIMENT)):
+    def _before(self) -> Sequence[runs.Run]:
+        """What the run that is gone on with has done."""
+        assert self._out is not None
+        read = [record.read(log) for log in sorted(self._out.glob("*.mcap"))]
+        found = runs.read(runs.of_kind(read, runs.EXPERIMENT))
+        if not found:
+            raise InputError(
+                f"{self._out} holds no run of `setae validate` to go on with.",
+                "Give the folder of that run as --out, or leave --resume out.",
+            )
+        return found
+
+    def _done(self, model: str, before: Sequence[runs.Run]) -> set[str]:
+        for run in before:
             if run.model == model:
                 self._require_same(run)
                 return set(run.visited)

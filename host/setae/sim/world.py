@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import difflib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from types import TracebackType
 from typing import Any, Self
 
@@ -24,6 +26,7 @@ _READ_ROOM = 4096
 Array = NDArray[np.float64]
 
 
+@cache
 def parameter_names() -> tuple[str, ...]:
     """Return the names of all parameters, such as ``spring.axial_rate_n_per_mm``."""
     library = load()
@@ -130,6 +133,12 @@ class World:
         InputError
             No parameter has that name, or the value is no good for it.
         """
+        if name not in (names := parameter_names()):
+            close = difflib.get_close_matches(name, names, n=1)
+            raise InputError(
+                f"The simulator has no parameter {name!r}.",
+                f"Did you mean {close[0]!r}?" if close else "They are in simulator/parameters.cpp.",
+            )
         self._change(self._library.setae_world_set(self._live, name.encode(), value))
 
     def get(self, name: str) -> float:

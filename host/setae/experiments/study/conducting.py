@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
 from pathlib import Path
+from types import FrameType
 from typing import Any, Final, TypeAlias
 
 from setae import extras
@@ -158,17 +162,18 @@ def _distributed(
             stack.enter_context(dask_config.set(_FEW_LOOKS))
             # Only this machine can reach it, it has no pages, and any free ports will do: studies
             # run beside each other.
-            cluster = stack.enter_context(
-                distributed.LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    host="127.0.0.1",
-                    dashboard_address="127.0.0.1:0",
-                    scheduler_kwargs={"dashboard": False},
-                    silence_logs=50,
+            with _interrupts_held_back():
+                cluster = stack.enter_context(
+                    distributed.LocalCluster(
+                        n_workers=workers,
+                        threads_per_worker=1,
+                        processes=True,
+                        host="127.0.0.1",
+                        dashboard_address="127.0.0.1:0",
+                        scheduler_kwargs={"dashboard": False},
+                        silence_logs=50,
+                    )
                 )
-            )
             client = stack.enter_context(distributed.Client(cluster))
         else:
             try:
@@ -187,6 +192,34 @@ def _distributed(
             run = of[future.key]
             lost = future.exception()
             yield run, future.result() if lost is None else _lost(run, lost)
+
+
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Have a Ctrl-C wait until the workers are there: half started they can't be ended in order.
+
+    They begin with it blocked and keep it so: this process ends them.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield  # where no Ctrl-C arrives
+        return
+    pressed = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal pressed
+        del number, frame
+        pressed = True
+
+    resource_tracker.ensure_running()  # with the first process, it would undo what follows
+    before = signal.signal(signal.SIGINT, note)
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        raise KeyboardInterrupt
 
 
 def _lost(run: Run, error: BaseException) -> Outcome:
