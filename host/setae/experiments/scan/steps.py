@@ -322,7 +322,7 @@ class Steps:
         return HeightWindowError(
             f"The retracted bristle touched something {x_mm:.0f}, {y_mm:.0f} mm from the first "
             "place: it can't be stepped over.",
-            "Raise the arm's start, see that the robot is straight when it is short, and scan anew.",
+            "Raise the arm's start, see that the short robot is straight, and scan anew.",
         )
 
     def _short_at_contact(self, contact: Contact) -> bool:
