@@ -22,7 +22,7 @@ def worst_against_shooting_mm() -> tuple[float, int]:
             world.start()
             driver = Driver(world)
             for lengths_mm in shooting.POSES_MM:
-                truth = driver.pull(lengths_mm)
+                truth = driver.pull(lengths_mm, rest_s=0.5)
                 expected_mm, _ = shooting.solve(parameters, truth)
                 errors_mm.append(float(np.linalg.norm(truth.backbone_mm[-1] - expected_mm)))
     return max(errors_mm), len(errors_mm)

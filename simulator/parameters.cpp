@@ -132,8 +132,9 @@ const Entry kEntries[] = {
     SETAE_ONE(plant, load_y_n, 0, -5, 5),
     SETAE_ONE(plant, load_z_n, 0, -5, 5),
     SETAE_ONE(plant, load_offset_mm, 0, 0, 300),
-    // How finely the rod is cut.
-    SETAE_ONE(plant, rod_elements, 10, 10, 20),
+    // How finely the rod is cut; 0 is by itself: 10, and 20 with an extra mode where its
+    // stiffness changes along it.
+    SETAE_ONE(plant, rod_elements, 0, 0, 20),
     SETAE_ONE(plant, rod_extra_modes, 0, 0, 1),
 };
 
@@ -185,8 +186,8 @@ bool set_parameter(Parameters& parameters, const std::string& name, double value
   const bool is_direction = name.compare(0, 16, "servo.direction_") == 0;
   if (is_direction && std::fabs(value) != 1)
     return fail(error, name + " must be 1 or -1");
-  if (name == "plant.rod_elements" && value != 10 && value != 20)
-    return fail(error, name + " must be 10 or 20");
+  if (name == "plant.rod_elements" && value != 0 && value != 10 && value != 20)
+    return fail(error, name + " must be 0, 10 or 20");
   const bool is_switch = name == "board.pose_known" || name == "plant.rod_extra_modes";
   if (is_switch && value != 0 && value != 1)
     return fail(error, name + " must be 0 or 1");

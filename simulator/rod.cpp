@@ -62,12 +62,14 @@ Rod::Rod(const Rigidity& rigidity, double length_mm, int elements, int extra_mod
   double weight[kMaxElements];
   for (int e = 0; e < elements_; ++e)
     weight[e] = 1 + rigidity.gradient * (2 * (e + 0.5) / elements_ - 1);
+  weight_0_ = weight[0];
   for (int m = 0; m < modes_; ++m) {
     for (int e = 0; e < elements_; ++e) {
-      basis_[e][m] = legendre(table_[m].order, (e + 0.5) / elements_);
+      // Forces and moments change little along the rod, strains as the stiffness does.
+      basis_[e][m] = legendre(table_[m].order, (e + 0.5) / elements_) / weight[e];
     }
-    // Sampled at the midpoints, and weighted by the stiffness there, the polynomials
-    // are not orthogonal: make them so, then the elastic energy needs no matrix.
+    // Sampled at the midpoints, and weighted by the stiffness there, these are not
+    // orthogonal: make them so, then the elastic energy needs no matrix.
     for (int k = 0; k < m; ++k) {
       if (table_[k].component != table_[m].component)
         continue;
@@ -152,14 +154,14 @@ Vec3 Rod::midpoint(const Shape& shape, int element) const {
 }
 
 Modes Rod::compressed(double length_mm, const Aside& aside) const {
-  // The lowest mode of each strain is the same all along.
+  // The lowest mode of each strain is the same all along, over the stiffness.
   const double wanted[kComponents] = {
       aside.bend_x_rad / length_mm_, aside.bend_y_rad / length_mm_, 0,
       aside.shift_x_mm / length_mm_, aside.shift_y_mm / length_mm_, length_mm / length_mm_ - 1};
   Modes modes{};
   for (int m = 0; m < modes_; ++m) {
     if (table_[m].order == 0)
-      modes[m] = wanted[table_[m].component] / basis_[0][m];
+      modes[m] = wanted[table_[m].component] / (basis_[0][m] * weight_0_);
   }
   return modes;
 }

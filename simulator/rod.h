@@ -15,7 +15,8 @@ namespace sim {
 constexpr int kMaxElements = 20;
 constexpr int kMaxStations = kMaxElements + 1;
 // Curvature x and y four each, torsion two, shear four each, axial three: the tip is
-// within 0.05 mm of the rod's strong form. `extra_modes` adds one to each. A robot
+// within 0.05 mm of the rod's strong form, all over the workspace nearly. `extra_modes`
+// adds one to each, which a stiffness that changes along the rod needs. A robot
 // that is symmetric needs only 13 of these; one of uneven stiffness that carries a
 // load bends in an S, and with 13 its tip is off by 0.5 mm.
 constexpr int kComponents = 6;
@@ -100,6 +101,7 @@ class Rod {
   int modes_ = 0;
   double element_mm_;
   double cosine_, sine_;  // of the stiffer axis
+  double weight_0_ = 1;   // stiffness of the first element, relative to the middle
   Mode table_[kMaxModes];
   double basis_[kMaxElements][kMaxModes];
 };

@@ -50,8 +50,13 @@ PlantSettings plant_settings(const Parameters& p) {
     s.top_hole_mm[i] = hole_mm(angle, p.tendon.radius_mm + p.tendon.top_radial_mm[i],
                                p.tendon.top_tangential_mm[i]);
   }
+  const bool changes = s.stiffness_gradient != 0;
   s.rod_elements = static_cast<int>(p.plant.rod_elements);
   s.rod_extra_modes = static_cast<int>(p.plant.rod_extra_modes);
+  if (s.rod_elements == 0) {
+    s.rod_elements = changes ? 20 : 10;
+    s.rod_extra_modes = changes ? 1 : s.rod_extra_modes;
+  }
   return s;
 }
 

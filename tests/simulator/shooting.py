@@ -38,12 +38,11 @@ POSES_MM = (
     (45.0, 50.0, 60.0, 55.0), (66.0, 60.0, 54.0, 60.0), (55.0, 62.0, 65.0, 58.0),
     (46.0, 46.0, 54.0, 54.0), (58.0, 50.0, 50.0, 58.0), (50.0, 60.0, 68.0, 60.0),
     (44.0, 50.0, 62.0, 56.0),  # one tendon on the edge of slack
+    (45.0, 60.0, 70.0, 60.0),  # bent by 75 degrees, the uneven robot by 86
+    (35.2, 42.7, 38.8, 31.3),  # short, all four taut: bent in an S
 )  # fmt: skip
 
-# Bent by 75 degrees, the uneven robot by 86. There the rod's ten elements are what limits it.
-FAR_MM = (45.0, 60.0, 70.0, 60.0)
-
-# The same twelve on a robot that is nowhere symmetric.
+# The same on a robot that is nowhere symmetric.
 UNEVEN = {
     "spring.bending_scale_x": 0.7, "spring.bending_scale_y": 0.9, "spring.bending_axis_deg": 30.0,
     "spring.stiffness_gradient": 0.2, "spring.shear_scale": 0.8, "servo.stiffness_n_per_mm": 15.0,

@@ -102,7 +102,28 @@ def test_what_friction_takes_grows_as_the_capstan_s(make_driver: MakeDriver) -> 
     assert 0 < ratio[0.2] < 2 * 0.2 * np.pi / 2
 
 
+def test_a_tendon_sticks_before_it_slides(make_driver: MakeDriver) -> None:
+    """To and fro by a mm: a loop where it slides at once, none where it only creeps."""
+    gap_n = {}
+    for presliding_mm in (0.05, 5.0):
+        driver = make_driver(
+            {**EXACT, "tendon.friction": 0.2, "tendon.presliding_mm": presliding_mm}
+        )
+        tension_n = [
+            driver.pull([length_mm, 60.0, 70.0, 60.0]).tension_n[0]
+            for length_mm in (46.0, 47.0, 46.5, 46.0, 46.5)
+        ]
+        gap_n[presliding_mm] = float(tension_n[2] - tension_n[4])  # wound, unwound
+    assert gap_n[0.05] > 5 * abs(gap_n[5.0])
+
+
 # ---------------------------------------------------------------- holes, bore, stiffness
+
+
+def test_tendons_at_other_angles_bend_it_there(make_driver: MakeDriver) -> None:
+    turned = {f"tendon.angle_deg_{i}": 90.0 * i + 30.0 for i in range(4)}
+    x, y, _ = tip(make_driver({**EXACT, **turned}))
+    assert np.degrees(np.arctan2(y, x)) == pytest.approx(30.0, abs=0.1)
 
 
 def test_holes_further_out_bend_less_for_the_same_pull(make_driver: MakeDriver) -> None:

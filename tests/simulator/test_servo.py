@@ -31,6 +31,16 @@ def test_no_faster_than_its_speed_limit(driver: Driver) -> None:
     assert speed == pytest.approx(np.full(len(speed), 190.0), rel=0.01)
 
 
+def test_it_nears_its_end_with_its_time_constant(make_driver: MakeDriver) -> None:
+    driver = make_driver({"servo.time_constant_s": 0.1, "servo.dead_band_us": 0.0})
+    driver.play([pulse(0, FREE + 40)])
+    left_mm = []
+    for _ in range(2):
+        left_mm.append(driver.world.truth().servo_length_mm[0] - (70.0 - 20 * MM_PER_US))
+        driver.wait(0.1)
+    assert left_mm[1] / left_mm[0] == pytest.approx(np.exp(-1), rel=0.15)
+
+
 def test_a_change_inside_the_dead_band_moves_nothing(driver: Driver) -> None:
     driver.play([pulse(1, FREE + 8)])  # 4 us
     driver.wait(0.3)
