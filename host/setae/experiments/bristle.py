@@ -117,7 +117,10 @@ class Threshold:
 
 
 def threshold(moves: Sequence[Move]) -> Threshold:
-    """Recommend a threshold: half-way where the two kinds part, else the fewest errors.
+    """Recommend a threshold: as far from both kinds where they part, else the fewest errors.
+
+    As far means as many times the loudest move as the lightest touch is times it: both come
+    louder or lighter by a part of themselves, by speed, depth and the filament's stiffness.
 
     Raises
     ------
@@ -127,17 +130,18 @@ def threshold(moves: Sequence[Move]) -> Threshold:
     Examples
     --------
     >>> free = [Move(touched=False, duration_s=1, depth_mm=math.nan, peak_hpa=p) for p in (3, 5)]
-    >>> touch = [Move(touched=True, duration_s=1, depth_mm=3, peak_hpa=p) for p in (21, 30)]
+    >>> touch = [Move(touched=True, duration_s=1, depth_mm=3, peak_hpa=p) for p in (20, 30)]
     >>> found = threshold(free + touch)
     >>> found.hpa, found.false, found.missed
-    (13.0, 0, 0)
+    (10.0, 0, 0)
     """
     free = np.sort([move.peak_hpa for move in moves if not move.touched])
     touches = np.sort([move.peak_hpa for move in moves if move.touched])
     if not len(free) or not len(touches):
         raise InputError("A threshold needs moves without contact and touches.", "Measure both.")
     if free[-1] < touches[0]:
-        return Threshold.of(round(float(free[-1] + touches[0]) / 2, 1), moves)
+        loudest = max(free[-1], 1 / PRESSURE_LSB_PER_HPA)
+        return Threshold.of(round(math.sqrt(loudest * touches[0]), 1), moves)
     places = np.unique(np.round(np.concatenate([free, touches, [free[-1] + 0.1]]), 2))
     false = 1 - np.searchsorted(free, places) / len(free)
     missed = np.searchsorted(touches, places) / len(touches)
