@@ -98,7 +98,8 @@ def _table(scans: Sequence[Scan]) -> str:
     if truth:
         head += ["error (mm)", "at edges (mm)"]
     if paper is not None and len(scans) > 1:
-        head.append("like the paper’s")
+        head.append('<span title="share of places where both found something, or both nothing">'
+                    "like the paper’s</span>")  # fmt: skip
     lines = ["<table><thead><tr>", *(f"<th>{name}</th>" for name in head), "</tr></thead><tbody>"]
     for scan in scans:
         marks = scan.result.height_map.mark

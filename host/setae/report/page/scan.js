@@ -37,15 +37,18 @@ function show(index) {
       line: { color: "#8a96a3", width: 2 },
     });
   }
+  // The longest side is 1, so that the camera has all of it in view.
+  const sides_mm = [...scan.size_mm, scan.range_mm[1] + 5], longest_mm = Math.max(...sides_mm);
   const axis = (text, range) => ({ title: { text }, range, gridcolor: run.colours.grid, backgroundcolor: "#fbfcfd", showbackground: true });
   Plotly.react("cloud", traces, {
     margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)",
     font: { family: "system-ui, sans-serif", size: 13, color: run.colours.ink },
     scene: {
-      aspectmode: "data",
+      aspectmode: "manual",
+      aspectratio: { x: sides_mm[0] / longest_mm, y: sides_mm[1] / longest_mm, z: sides_mm[2] / longest_mm },
       xaxis: axis("x (mm)", [0, scan.size_mm[0]]), yaxis: axis("y (mm)", [0, scan.size_mm[1]]),
-      zaxis: axis("z (mm)", [0, scan.range_mm[1] + 5]),
-      camera: { eye: { x: -1.05, y: -1.6, z: 1.1 } },
+      zaxis: { ...axis("z (mm)", [0, sides_mm[2]]), nticks: 3 },
+      camera: { eye: { x: -0.85, y: -1.3, z: 0.9 } },
     },
   }, { responsive: true, displaylogo: false, displayModeBar: false });
 }
