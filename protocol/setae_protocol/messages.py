@@ -63,7 +63,7 @@ PULSE_TICKS_ABSOLUTE_MAX: Final = 5000
 """Compiled-in upper bound of every pulse (2500 us)."""
 ATTACH_INTERVAL_FRAMES: Final = 5
 """Servo frames between attaching one servo and the next: one start-up current at a time."""
-SCHEMA_HASH: Final = 0xF340D815
+SCHEMA_HASH: Final = 0x48646F11
 """CRC-32C of what host and board must agree on; compared in the handshake."""
 CRC_BYTES: Final = 4
 HOST_OVERHEAD_BYTES: Final = 9
@@ -289,8 +289,7 @@ class Refusal(IntEnum):
     TARE_NOISY = 14
     TARE_FAR = 15
     REFLEX_RUNNING = 16
-    SUPPLY_LOW = 17
-    STOP_SWITCH = 18
+    STOP_SWITCH = 17
 
     @property
     def doc(self) -> str:
@@ -327,7 +326,6 @@ _REFUSAL_DOC: Mapping[Refusal, str] = MappingProxyType(
             "contact already."
         ),
         Refusal.REFLEX_RUNNING: "The reflex has not ended yet.",
-        Refusal.SUPPLY_LOW: "The board's supply is too low to write its EEPROM.",
         Refusal.STOP_SWITCH: "The stop switch is open.",
     }
 )
@@ -352,7 +350,6 @@ _REFUSAL_REMEDY: Mapping[Refusal, str] = MappingProxyType(
         Refusal.TARE_NOISY: "Let the robot rest before a guarded move; check the silicone bond.",
         Refusal.TARE_FAR: "Retract first; armed in contact means blind.",
         Refusal.REFLEX_RUNNING: "Wait for it, then call resume(), or give `setae enable`.",
-        Refusal.SUPPLY_LOW: "Give the servos a supply of their own, then store again.",
         Refusal.STOP_SWITCH: "Close it, then call resume(), or give `setae enable`.",
     }
 )
@@ -375,8 +372,8 @@ class ResetCause(IntEnum):
 
 _RESETCAUSE_DOC: Mapping[ResetCause, str] = MappingProxyType(
     {
-        ResetCause.UNKNOWN: "The bootloader cleared the register and nothing was retained.",
-        ResetCause.POWER_ON: "Power came up.",
+        ResetCause.UNKNOWN: "The board could not tell.",
+        ResetCause.POWER_ON: "Power came up, or this firmware runs for the first time.",
         ResetCause.EXTERNAL: "The reset pin: the button, or a host opening the port (DTR).",
         ResetCause.BROWN_OUT: "The supply fell below 2.7 V.",
         ResetCause.WATCHDOG: "The firmware's loop stalled.",

@@ -216,8 +216,7 @@ REFUSAL = Codes(
         Code("tare_noisy", 14, "The pressure was not steady while the baseline was taken.", "Let the robot rest before a guarded move; check the silicone bond."),
         Code("tare_far", 15, "The pressure at arming was far from its rest value: the bristle seems to be in contact already.", "Retract first; armed in contact means blind."),
         Code("reflex_running", 16, "The reflex has not ended yet.", "Wait for it, then call resume(), or give `setae enable`."),
-        Code("supply_low", 17, "The board's supply is too low to write its EEPROM.", "Give the servos a supply of their own, then store again."),
-        Code("stop_switch", 18, "The stop switch is open.", "Close it, then call resume(), or give `setae enable`."),
+        Code("stop_switch", 17, "The stop switch is open.", "Close it, then call resume(), or give `setae enable`."),
     ),
 )
 
@@ -225,8 +224,8 @@ RESET_CAUSE = Codes(
     "ResetCause",
     "Why the board started.",
     (
-        Code("unknown", 0, "The bootloader cleared the register and nothing was retained."),
-        Code("power_on", 1, "Power came up."),
+        Code("unknown", 0, "The board could not tell."),
+        Code("power_on", 1, "Power came up, or this firmware runs for the first time."),
         Code("external", 2, "The reset pin: the button, or a host opening the port (DTR)."),
         Code("brown_out", 3, "The supply fell below 2.7 V."),
         Code("watchdog", 4, "The firmware's loop stalled."),

@@ -237,9 +237,9 @@ class Load:
 
     def __init__(self, driver: Driver) -> None:
         self._uno = driver.uno
-        foreign = encode_host(Ping(token=0x01020304), session=driver.session_id + 1)
+        self._foreign = encode_host(Ping(token=0x01020304), session=driver.session_id + 1)
         question = encode_host(ReadLimits(token=0), session=driver.session_id)
-        self._filler = question + 3 * foreign
+        self._filler = question + 3 * self._foreign
         driver.session.pollables.append(self)
 
     def poll(self, now_us: int) -> None:
@@ -247,6 +247,14 @@ class Load:
         del now_us
         while self._uno.line_free < self._uno.cycle + _BACKLOG_CYCLES:
             self._uno.send(self._filler)
+
+    def fill_until(self, cycle: int, *, leave_bytes: int) -> None:
+        """Put so much more on the line that a frame of that size passes at that cycle."""
+        room = (cycle - self._uno.line_free) // (_BYTE_US * CYCLES_PER_US) - leave_bytes
+        assert room >= 0, "there is more on the line already"
+        for part in (self._filler, self._foreign, bytes(1)):
+            self._uno.send(part * (room // len(part)))
+            room %= len(part)
 
 
 def first_still(frames: Sequence[FramePulses]) -> FramePulses:

@@ -29,6 +29,7 @@ CYCLES_PER_TICK = CYCLES_PER_US // PULSE_TICKS_PER_US
 FRAME_CYCLES = SERVO_FRAME_US * CYCLES_PER_US
 _BIT_CYCLES = 1e6 * CYCLES_PER_US / BAUD
 _ROOM = 4096
+_INTERRUPTS_OFF = b"\xf8\x94"  # CLI
 _TURN_ON_THE_SPOT = b"\xff\xcf"  # RJMP to itself
 # A Python program still sees Ctrl-C.
 _SLICE_US = 100_000
@@ -268,13 +269,14 @@ class Uno:
         """
         self._library.uno_hold_program(self._handle, from_cycle, cycles)
 
-    def hang(self) -> tuple[int, bytes]:
-        """Let the program turn on the spot, interrupts on. Returns what `load` mends it with."""
+    def hang(self, *, interrupts: bool = True) -> tuple[int, bytes]:
+        """Let the program turn on the spot. Returns what `load` mends it with."""
         while not self._library.uno_interrupts_on(self._handle):
             self.run_to(self.cycle + 1)
         address = self._library.uno_program_counter(self._handle)
-        before = self.flash(address, len(_TURN_ON_THE_SPOT))
-        self.load(address, _TURN_ON_THE_SPOT)
+        program = _TURN_ON_THE_SPOT if interrupts else _INTERRUPTS_OFF + _TURN_ON_THE_SPOT
+        before = self.flash(address, len(program))
+        self.load(address, program)
         return address, before
 
     # ---------------------------------------------------------------------------- power

@@ -15,7 +15,14 @@ from tests.avr.simavr import (
 from setae import __version__
 from setae.errors import BoardResetError
 from setae.link.session import Session
-from setae_protocol.messages import PROTOCOL_VERSION, SCHEMA_HASH, ResetCause, Sensor, State
+from setae_protocol.messages import (
+    PROTOCOL_VERSION,
+    SCHEMA_HASH,
+    Fault,
+    ResetCause,
+    Sensor,
+    State,
+)
 
 POSE = (1700, 1800, 1900, 2000)
 
@@ -91,6 +98,39 @@ def test_a_loop_that_hangs_is_reset_and_says_so_and_its_last_pulses_are_whole(
     assert hello.reset_cause == ResetCause.WATCHDOG
     assert hello.pose_known == 1
     assert hello.pulse_ticks == POSE
+
+
+def test_a_hang_with_interrupts_off_is_a_watchdog_reset_by_the_flag_alone(driver: Driver) -> None:
+    """It was told as the button's."""
+    uno = driver.uno
+    driver.session.run_for(60_000)
+    resets = uno.statistics().resets
+    address, before = uno.hang(interrupts=False)
+    while uno.statistics().resets == resets:
+        uno.run_for_us(1_000)
+    uno.load(address, before)
+
+    again = Driver(uno, session_id=9)
+    again.session.open()
+    again.session.run_for(100_000)
+    assert again.session.hello is not None
+    assert again.session.hello.reset_cause == ResetCause.WATCHDOG
+    assert [fault.record.fault for fault in again.faults] == [Fault.WATCHDOG]
+
+
+@pytest.mark.parametrize("lost_power", [True, False])
+def test_the_bootloader_does_not_hide_whether_power_was_lost(
+    driver: Driver, lost_power: bool
+) -> None:
+    """It clears the flags, and power-on was told as unknown."""
+    uno = driver.uno
+    uno.install_bootloader()
+    if lost_power:
+        uno.cycle_power()
+    else:
+        uno.press_reset()
+    hello = Session(AvrTransport(uno), session_id=9).open()
+    assert hello.reset_cause == (ResetCause.POWER_ON if lost_power else ResetCause.EXTERNAL)
 
 
 def test_what_happened_is_read_through_the_reset_of_a_new_connection(driver: Driver) -> None:

@@ -23,8 +23,7 @@ def test_the_corpus_meets_every_mode_fault_refusal_and_trip() -> None:
     met = {name: {int(number) for number in numbers} for name, *numbers in lines}
     assert met["mode"] == set(range(9))
     assert met["fault"] == set(Fault) - {Fault.NONE, Fault.INTERNAL}
-    # A low supply is a fault, and that refuses first.
-    assert met["refusal"] == set(Refusal) - {Refusal.NONE, Refusal.SUPPLY_LOW}
+    assert met["refusal"] == set(Refusal) - {Refusal.NONE}
     assert met["trip"] == set(TripCause)
 
 

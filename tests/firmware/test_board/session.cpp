@@ -44,6 +44,7 @@ TEST_CASE("hello tells versions, limits, pose and sensor") {
   CHECK(reply.previous_session == 0);
 
   rig.send(protocol::ReadLimits{});
+  rig.poll();
   REQUIRE(rig.limits.size() == 1);
   uint8_t payload[protocol::Limits::kSize];
   encode(rig.limits[0].message, payload);

@@ -30,8 +30,6 @@ void Board::poll() {
     begin_frame(frame);
   watch_stop_switch();
   read_sensor();
-  if (sample_goes_first())
-    return;
   receive();
   // Only at rest: a servo's current may pull the supply down in the middle of a byte.
   if (mode_ == Mode::kRelaxed && store_.step(limits_.in_force()))
@@ -39,14 +37,11 @@ void Board::poll() {
   report();
 }
 
-// What a sample says must reach the next frame, even one that is ready only 0.5 ms before it: so
-// near the frame's end nothing long is begun while a sample is being fetched. Unless bytes would be
-// lost: the next ones need room until the frame has begun.
-bool Board::sample_goes_first() {
-  constexpr uint16_t kNearUs = 800;
-  constexpr uint8_t kWaitingBytes = 72;
-  return hal_.sample_on_its_way() && hal_.received().size() < kWaitingBytes &&
-         hal_.frame_ends_within(kNearUs);
+// What a sample says must reach the next frame, even one that is ready only 0.5 ms before it, and
+// so must a stop: near the frame's end, while a sample is being fetched, bytes are taken by turns
+// with a look whether it is there.
+bool Board::sample_is_urgent() {
+  return hal_.sample_on_its_way() && hal_.frame_ends_within(kQuietUs);
 }
 
 // In the frame that the board is in, even where the next one has begun.

@@ -51,10 +51,15 @@ class Board {
  private:
   friend struct BoardProbe;  // tests/fuzz
 
+  // What comes 0.5 ms before a frame, a sample or a stop, is to reach that frame. Writing a report
+  // takes up to 0.45 ms while a sample is being fetched, so none is begun so near the frame's end.
+  // What is written already lasts the line for most of that.
+  static constexpr uint16_t kQuietUs = 700;
+
   // ---- board.cpp: time ----
   SETAE_OWN_FRAME void start();
   SETAE_OWN_FRAME void start_limits();
-  bool sample_goes_first();
+  bool sample_is_urgent();
   BoardTime now();
   SETAE_OWN_FRAME void begin_frame(uint32_t frame);
   void advance_motion();
@@ -128,18 +133,18 @@ class Board {
     kReceipt = 1 << 1,
     kHelloReply = 1 << 2,
     kPong = 1 << 3,
-    kLimits = 1 << 4,
-    kStatus = 1 << 5,
+    kStatus = 1 << 4,
+    kLimits = 1 << 5,
   };
   void want(Report report) { wanted_ |= report; }
   void report();
-  bool send(Report report);
-  SETAE_OWN_FRAME bool send_receipt();
-  SETAE_OWN_FRAME bool send_hello_reply();
-  SETAE_OWN_FRAME bool send_limits();
-  SETAE_OWN_FRAME bool send_pong();
-  SETAE_OWN_FRAME bool send_telemetry();
-  SETAE_OWN_FRAME bool send_status();
+  void send(Report report);
+  SETAE_OWN_FRAME void send_receipt();
+  SETAE_OWN_FRAME void send_hello_reply();
+  SETAE_OWN_FRAME void send_limits();
+  SETAE_OWN_FRAME void send_pong();
+  SETAE_OWN_FRAME void send_telemetry();
+  SETAE_OWN_FRAME void send_status();
   template <typename Record>
   SETAE_OWN_FRAME bool send_latched(Latch<Record>& latch);
   // What each message begins with; the transmitter adds the rest.

@@ -11,6 +11,8 @@ namespace {
 
 // Each look at what has come costs as much as six bytes. So many are worth one under load.
 constexpr uint8_t kBytesAtATime = 32;
+// No more between two looks at the sensor, where its sample is urgent.
+constexpr uint8_t kBytesBetween = 16;
 // Of a new frame some are taken soon, so that a short one is all but done when it ends.
 constexpr uint8_t kFirstBytes = 10;
 // A stop is to reach the next frame even if it comes just before it.
@@ -44,18 +46,21 @@ bool Board::take_received() {
     uint8_t count = ring.front_size();
     if (count > left)
       count = left;
+    if (count > kBytesBetween && sample_is_urgent())
+      count = kBytesBetween;
     bool message;
     count = receiver_.take(ring.front(), count, message);
     ring.drop(count);
     left -= count;
-    if (message) {
+    if (message)
       handle_message();
-      if (sample_goes_first()) {
+    if (sample_is_urgent()) {
+      if (left != 0)
         ring.ended = true;
-        return false;
-      }
-      report();
+      return false;
     }
+    if (message)
+      report();
   }
   return true;
 }

@@ -11,9 +11,6 @@ namespace {
 
 // What comes while a frame begins and a report is made finds room beside so many.
 constexpr uint8_t kReceivedFirstBytes = 48;
-// Writing a message takes up to 0.35 ms, and a stop is to reach the next frame even if it comes
-// just before it. What is written already lasts the line until then.
-constexpr uint16_t kQuietUs = 500;
 
 }  // namespace
 
@@ -37,16 +34,15 @@ void Board::report() {
     return;
   if (record && (!send_latched(trip_) || !send_latched(fault_) || !send_latched(refusal_)))
     return;
-  while (wanted != 0) {
+  while (wanted != 0 && transmitter_.ready() && !hal_.frame_ends_within(kQuietUs)) {
     const uint8_t first = wanted & static_cast<uint8_t>(-wanted);
-    if (!send(static_cast<Report>(first)))
-      return;
+    send(static_cast<Report>(first));
     wanted &= static_cast<uint8_t>(~first);
     wanted_ &= static_cast<uint8_t>(~first);
   }
 }
 
-bool Board::send(Report report) {
+void Board::send(Report report) {
   switch (report) {
     case kTelemetry:
       return send_telemetry();
@@ -63,7 +59,7 @@ bool Board::send(Report report) {
   }
 }
 
-// False where it is wanted and the line has no room.
+// Only where the line has room, as those below. False: it hadn't for this one.
 template <typename Record>
 bool Board::send_latched(Latch<Record>& latch) {
   if (!latch.wanted(session_.open()))
@@ -84,15 +80,13 @@ Board::Header::Header(const Board& board) {
     state |= protocol::kRefusalWaits;
 }
 
-bool Board::send_receipt() {
+void Board::send_receipt() {
   const protocol::Receipt receipt = {gap_};
-  if (!transmitter_.send(Header(*this), receipt))
-    return false;
+  transmitter_.send(Header(*this), receipt);
   gap_ = false;
-  return true;
 }
 
-bool Board::send_hello_reply() {
+void Board::send_hello_reply() {
   protocol::HelloReply reply = {};
   reply.protocol_version = protocol::kProtocolVersion;
   reply.schema_hash = protocol::kSchemaHash;
@@ -110,21 +104,21 @@ bool Board::send_hello_reply() {
   for (uint8_t i = 0; i < protocol::kServos; ++i)
     reply.pulse_ticks[i] = pose.pulses.ticks[i];
   reply.sensor = static_cast<uint8_t>(sensor_);
-  return transmitter_.send(Header(*this), reply);
+  transmitter_.send(Header(*this), reply);
 }
 
-bool Board::send_limits() {
-  return transmitter_.send_as(protocol::Limits::kType, Header(*this), limits_.in_force());
+void Board::send_limits() {
+  transmitter_.send_as(protocol::Limits::kType, Header(*this), limits_.in_force());
 }
 
-bool Board::send_pong() {
+void Board::send_pong() {
   // The moment of answering, not of asking: the host halves the round trip.
   const BoardTime now = hal_.now();
   const protocol::Pong pong = {ping_token_, now.frame, now.phase_us};
-  return transmitter_.send(Header(*this), pong);
+  transmitter_.send(Header(*this), pong);
 }
 
-bool Board::send_telemetry() {
+void Board::send_telemetry() {
   const BoardTime time = now();
   protocol::Telemetry telemetry = {};
   telemetry.frame = time.frame;
@@ -146,13 +140,11 @@ bool Board::send_telemetry() {
   telemetry.rx_damaged = receiver_.damaged();
   telemetry.stop_number = stop_number_;
   telemetry.underruns = underruns_;
-  if (!transmitter_.send(Header(*this), telemetry))
-    return false;
+  transmitter_.send(Header(*this), telemetry);
   samples_.clear();
-  return true;
 }
 
-bool Board::send_status() {
+void Board::send_status() {
   const LineErrors errors = hal_.line_errors();
   protocol::Status status = {};
   status.supply_mv = supply_mv(hal_.bandgap_part());
@@ -163,10 +155,8 @@ bool Board::send_status() {
   status.rx_overruns = errors.overrun;
   status.rx_overflows = errors.dropped;
   status.late_pulses = hal_.late_pulses();
-  if (!transmitter_.send(Header(*this), status))
-    return false;
+  transmitter_.send(Header(*this), status);
   status_age_frames_ = 0;
-  return true;
 }
 
 }  // namespace setae

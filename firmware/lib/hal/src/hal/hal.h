@@ -72,7 +72,7 @@ class Hal {
   // Never waits longer than 1 ms.
   SETAE_ASK SensorReading read_sensor() SETAE_ANSWER;
 
-  // It is being fetched: soon read_sensor() has it.
+  // It is being fetched, or waits for read_sensor().
   SETAE_ASK bool sample_on_its_way() SETAE_ANSWER;
 
   SETAE_ASK protocol::ResetCause reset_cause() SETAE_ANSWER;

@@ -39,6 +39,7 @@ constexpr uint8_t kLookTicks = 16;
 constexpr uint8_t kWaitStep = 4;
 constexpr uint8_t kLooksMax = 12;
 
+constexpr uint8_t kSoonestMatch = 2;
 constexpr uint8_t kTimerTicks = 32;     // of 0.5 us each
 constexpr uint16_t kStatusTicks = 240;  // a read's start to its look at the status
 
@@ -47,10 +48,15 @@ uint8_t rounds_left;  // of Timer0, 4.1 ms each
 
 constexpr uint8_t kTimerOn = _BV(OCIE0A);
 
+// Timer0 matches once in 256 ticks. One that is due now, or at the next tick, would come a whole
+// turn too soon or too late.
 void start_timer(uint16_t ticks) {
+  uint8_t first = static_cast<uint8_t>(ticks);
+  if (first < kSoonestMatch)
+    first = kSoonestMatch;
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    rounds_left = static_cast<uint8_t>((ticks - 1) >> 8);
-    OCR0A = static_cast<uint8_t>(TCNT0 + ticks);
+    rounds_left = static_cast<uint8_t>(ticks >> 8);
+    OCR0A = static_cast<uint8_t>(TCNT0 + first);
     TIFR0 = _BV(OCF0A);
     TIMSK0 |= kTimerOn;
   }
@@ -144,10 +150,11 @@ void Lps33hw::take_sample(SensorReading& reading) {
   const uint8_t* data = twi_.data();
   const uint16_t begun_ticks = twi_.begun_ticks();
   if (twi_.found()) {
-    const uint32_t raw =
-        static_cast<uint32_t>(data[3]) << 16 | static_cast<uint16_t>(data[2]) << 8 | data[1];
+    const uint8_t sign = (data[3] & 0x80) != 0 ? 0xFF : 0;  // of 24 bits
+    const uint32_t raw = static_cast<uint32_t>(sign) << 24 | static_cast<uint32_t>(data[3]) << 16 |
+                         static_cast<uint16_t>(data[2]) << 8 | data[1];
     reading.fresh = true;
-    reading.pressure_raw = static_cast<int32_t>(raw << 8) / 256;  // sign of 24 bits
+    reading.pressure_raw = static_cast<int32_t>(raw);
     reading.sampled = servo_pulses::at(static_cast<uint16_t>(begun_ticks + kStatusTicks));
     since_frame_ = servo_pulses::frame_number();
     if (by_timer_)

@@ -19,8 +19,8 @@ class Lps33hw {
   // Hands out what has come, without waiting.
   SensorReading poll();
 
-  // A sample is about to come, or on its way.
-  bool fetching() const { return running_ && twi_.busy(); }
+  // A sample is about to come, on its way, or there for poll() to hand out.
+  bool fetching() const { return running_ && twi_.pending(); }
 
   // For the handlers: by the timer, or by D2.
   void fetch(bool by_timer);

@@ -26,15 +26,20 @@ protocol::ResetCause cause = protocol::ResetCause::kUnknown;
 
 void begin() {
   const bool kept = block.alive == kAliveMark;
-  // A watchdog reset is known by the mark alone: bootloaders use the watchdog to start us.
+  // Bootloaders clear the flags, and after a reset by the pin they use the watchdog to start us. So
+  // a stall is known by its mark; by the flag only where it is the only one.
   if (kept && block.stall == kStallMark) {
     cause = protocol::ResetCause::kWatchdog;
   } else if (reset_flags & _BV(PORF)) {
     cause = protocol::ResetCause::kPowerOn;
   } else if (reset_flags & _BV(BORF)) {
     cause = protocol::ResetCause::kBrownOut;
+  } else if (reset_flags == _BV(WDRF)) {  // interrupts were off
+    cause = protocol::ResetCause::kWatchdog;
   } else if (kept || (reset_flags & _BV(EXTRF))) {
     cause = protocol::ResetCause::kExternal;
+  } else {
+    cause = protocol::ResetCause::kPowerOn;
   }
   block.alive = kAliveMark;
   block.stall = 0;

@@ -32,7 +32,8 @@ class Twi {
   void go();
 
   Result poll();
-  bool busy() const { return result_ == Result::kBusy; }
+  // Until poll() has told how it ended.
+  bool pending() const { return !told_; }
   const uint8_t* data() const { return data_; }
   // How polling went: what data() has is new; how often it was read in vain; and when the last read
   // began, in servo_pulses::ticks().
@@ -58,8 +59,8 @@ class Twi {
   uint8_t size_ = 0;
   bool reading_ = false;
   bool begun_ = false;  // the START is on its way
-  bool told_ = true;
   // The handler's, while a transfer runs.
+  volatile bool told_ = true;
   volatile uint16_t begun_ticks_ = 0;
   uint8_t moved_ = 0;  // bytes
   bool reg_sent_ = false;

@@ -60,7 +60,7 @@ constexpr uint16_t kPulseTicksAbsoluteMax = 5000;
 // Servo frames between attaching one servo and the next: one start-up current at a time.
 constexpr uint8_t kAttachIntervalFrames = 5;
 // CRC-32C of what host and board must agree on; they compare it in the handshake.
-constexpr uint32_t kSchemaHash = 0xF340D815;
+constexpr uint32_t kSchemaHash = 0x48646F11;
 // CRC, COBS code byte and delimiter: what a frame has besides header and payload.
 constexpr uint8_t kCrcBytes = 4;
 constexpr uint8_t kStuffingBytes = 2;
@@ -191,18 +191,16 @@ enum class Refusal : uint8_t {
   kTareFar = 15,
   // The reflex has not ended yet.
   kReflexRunning = 16,
-  // The board's supply is too low to write its EEPROM.
-  kSupplyLow = 17,
   // The stop switch is open.
-  kStopSwitch = 18,
+  kStopSwitch = 17,
 };
-constexpr uint8_t kRefusalCount = 19;
+constexpr uint8_t kRefusalCount = 18;
 
 // Why the board started.
 enum class ResetCause : uint8_t {
-  // The bootloader cleared the register and nothing was retained.
+  // The board could not tell.
   kUnknown = 0,
-  // Power came up.
+  // Power came up, or this firmware runs for the first time.
   kPowerOn = 1,
   // The reset pin: the button, or a host opening the port (DTR).
   kExternal = 2,
