@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import subprocess
@@ -11,11 +12,12 @@ from pathlib import Path
 import pytest
 from tests.system.serial_board import SerialBoard
 
-from setae import record
+from setae import record, rig
 from setae.cli import main
 from setae.config import load
 from setae.errors import InputError
-from setae.experiments.bristle import Move, Threshold, moves_in, surface_mm, threshold
+from setae.experiments.bristle import Bristle, Move, Threshold, moves_in, surface_mm, threshold
+from setae.scene import open_scene
 from setae.sim import World
 
 RAISED_MM = 30.0
@@ -52,6 +54,18 @@ def test_moves_and_touches_part_near_the_papers_threshold_and_give_a_usable_frag
     assert len((out / "moves.csv").read_text().splitlines()) == 21
     # The robot was left alone with nothing in its way.
     assert record.read(out / "bristle.mcap").array("/telemetry", "state")[-1] == "relaxed"
+
+
+def test_a_touch_begins_off_the_surface_though_the_robot_froze_on_its_way_up() -> None:
+    """One in four hundred began where the last had frozen: so little was left to feel."""
+    config = load()
+    watchful = dataclasses.replace(config.bristle, coarse_threshold_hpa=25.0)
+    config = dataclasses.replace(config, bristle=watchful)
+    scene = open_scene(surface_mm(config))
+    with rig.open("sim://", config=config, seed=3, scene=scene, leave="hold") as opened:
+        opened.robot.enable()
+        touches = Bristle(opened.robot, seed=3).touches(4)
+    assert min(touch.peak_hpa for touch in touches) > 20
 
 
 def test_a_board_at_a_port_and_a_person_who_puts_something_below_it(tmp_path: Path) -> None:

@@ -64,3 +64,6 @@ def test_each_plant_gives_the_papers_answer_or_the_report_says_why_not(
         assert same not in sentences([other])
     else:
         assert "touched nothing" in section(trials) or "ended early" in section(trials)
+        assert "tendon.offset_mm" in told[-1]
+    if plant == "paper_like":  # where it was, and how it was held, as it passed the cube
+        assert "short of it sideways; tendon 0 pulled" in told[2]

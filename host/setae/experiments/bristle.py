@@ -48,6 +48,7 @@ _REST_S = 0.15
 _AFTER_S = 0.1  # the servos lag, and so does the pressure
 _CLEAR_MM = 2.0  # between the lowest free move and the surface
 _TURN_RAD = math.radians(4.0)
+_TRIES = 5  # to get away from what it presses on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -186,7 +187,7 @@ class Bristle:
         home = self._arc(self._settings.compressed_length_mm, 0.0, 0.0)
         found: list[Move] = []
         with self._watching():
-            self._go(home, 0.5)
+            self._return(0.5)
             while len(found) < count:
                 height = self._rng.uniform(
                     self._settings.compressed_length_mm + 4, self._settings.target_height_mm - 2
@@ -197,21 +198,20 @@ class Bristle:
                 for place in (away, home):
                     if len(found) < count:
                         found.append(self._measured(place, math.nan))
-            self._go(home, 0.5)
+            self._return(0.5)
         return found
 
     def touches(self, count: int) -> list[Move]:
         """Reach down to the surface and beyond, somewhere below."""
-        home = self._arc(self._settings.compressed_length_mm, 0.0, 0.0)
         found: list[Move] = []
         with self._watching():
-            self._go(home, 0.5)
+            self._return(0.5)
             while len(found) < count:
                 depth = self._rng.uniform(*DEPTH_MM)
                 bend = self._rng.uniform(0, _TURN_RAD)
                 turn = self._rng.uniform(0, 2 * math.pi)
                 found.append(self._measured(self._reaching(depth, bend, turn), depth))
-                self._go(home, 0.4)
+                self._return(0.4)
         return found
 
     def _reaching(self, depth_mm: float, bend_rad: float, turn_rad: float) -> tuple[float, ...]:
@@ -255,12 +255,25 @@ class Bristle:
             self._on_event(Event(time_us=self._robot.now_us, name="move", data=data))
         return move
 
-    def _go(self, place: Sequence[float], duration_s: float) -> None:
+    def _go(self, place: Sequence[float], duration_s: float) -> bool:
+        """Move; False where it froze on the way: pressed harder than any move may."""
         try:
             self._robot.move_to(place, duration_s=duration_s)
         except TrippedError:
-            # Pressed harder than any move may: a touch all the same, and it goes on.
             self._robot.resume()
+            return False
+        return True
+
+    def _return(self, duration_s: float) -> None:
+        """Get short, all the way: a bent bristle that springs back may freeze it again."""
+        home = self._arc(self._settings.compressed_length_mm, 0.0, 0.0)
+        for _ in range(_TRIES):
+            if self._go(home, duration_s):
+                return
+        raise SetaeError(
+            f"The bristle presses on something, and {_TRIES} moves away from it were stopped.",
+            "Make room for the bristle, and start anew.",
+        )
 
     @contextlib.contextmanager
     def _watching(self) -> Iterator[None]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -40,13 +41,32 @@ def sentences(trials: Sequence[Trial]) -> list[str]:
             f"was touched, the spring’s top ended {np.mean(beside_mm):.1f} mm from its target on "
             f"average, {max(beside_mm):.1f} mm at most."
         )
+    aside_mm = [value for trial in trials for value in _aside_mm(trial)]
+    if aside_mm:
+        told.append(
+            "Short and straight before each extension, as commanded, it truly hung"
+            f" {np.mean(aside_mm):.1f} mm aside on average, {max(aside_mm):.1f} mm at most."
+        )
     rows = compare(trials)
     differing = [row.trial for row in rows if row.agrees is False or not row.trial.complete]
     for trial in differing:
         told += [f"Trial {trial.number} {text}" for text in _why(trial)]
+    if differing:
+        told.append(f"Its imperfections: {_named(parameters)}.")
     if beside_mm and all(row.agrees for row in rows):
         told.append("Every trial came out as the paper’s all the same.")
     return told
+
+
+def _named(parameters: Mapping[str, float]) -> str:
+    """Each parameter once, with the range over the tendons."""
+    ranges: dict[str, list[float]] = {}
+    for name, value in parameters.items():
+        ranges.setdefault(re.sub(r"_\d$", "", name), []).append(value)
+    return ", ".join(
+        f"{name} {min(values):g}" + (f" to {max(values):g}" if len(set(values)) > 1 else "")
+        for name, values in ranges.items()
+    )
 
 
 def _beside_mm(trial: Trial) -> list[float]:
@@ -68,6 +88,17 @@ def _beside_mm(trial: Trial) -> list[float]:
     return found
 
 
+def _aside_mm(trial: Trial) -> list[float]:
+    """How far the spring's top was from its axis at the start of each extension."""
+    times_us = trial.log.times_us("/truth")
+    if not times_us.size:
+        return []
+    top_mm = trial.log.array("/truth", "backbone_mm")[:, -1]
+    starts_us = [event.time_us for event in trial.log.events("direction_start")]
+    at = np.minimum(np.searchsorted(times_us, starts_us), len(times_us) - 1)
+    return [float(aside) for aside in np.hypot(*top_mm[at, :2].T)]
+
+
 def _why(trial: Trial) -> list[str]:
     told = [text for contact in trial.contacts[:3] if (text := _in_the_air(trial, contact))]
     if not trial.complete:
@@ -76,9 +107,40 @@ def _why(trial: Trial) -> list[str]:
         felt = "something" if trial.touched else "nothing"
         told.append(
             f"went {trial.descent_mm:g} mm down and truly touched {felt}: its bristle went other "
-            "ways than commanded."
+            f"ways than commanded{_towards_the_cube(trial)}."
         )
     return told
+
+
+def _towards_the_cube(trial: Trial) -> str:
+    """What the spring did at the deepest free extension towards the cube; empty without one."""
+    ends = [
+        event
+        for event in trial.log.events("direction_end")
+        if event.data.get("alpha_deg") == trial.azimuth_deg and not event.data.get("touched")
+    ]
+    times_us = trial.log.times_us("/truth")
+    if trial.cube is None or not ends or not times_us.size:
+        return ""
+    index = int(np.searchsorted(times_us, ends[-1].time_us)) - 1
+    target_mm = next(
+        event.data["target_mm"]
+        for event in trial.log.events("direction_start")
+        if event.data["alpha_deg"] == trial.azimuth_deg
+    )
+    alpha_rad = math.radians(trial.azimuth_deg)
+    missing_mm = np.array(target_mm) - trial.log.array("/truth", "backbone_mm")[index, -1]
+    short_mm = missing_mm[0] * math.cos(alpha_rad) + missing_mm[1] * math.sin(alpha_rad)
+    tendons = [
+        f"tendon {i} {'hung slack' if tension_n < _SLACK_N else f'pulled {tension_n:.1f} N'}"
+        for i, tension_n in enumerate(trial.log.array("/truth", "tension_n")[index])
+    ]
+    way = "short of" if short_mm > 0 else "beyond"
+    return (
+        f". Towards the cube, at {trial.azimuth_deg:g}°, the spring’s top ended"
+        f" {math.hypot(*missing_mm):.1f} mm from its target, {abs(short_mm):.1f} mm {way} it"
+        f" sideways; {', '.join(tendons)}"
+    )
 
 
 def _in_the_air(trial: Trial, contact: Contact) -> str:
