@@ -11,6 +11,7 @@ from multiprocessing import get_context
 from typing import TypeVar
 
 from bench import elf
+from tests.avr.aimed import RATE_SPREAD
 from tests.avr.driver import Driver, Load, Ticks
 from tests.avr.simavr import (
     CYCLES_PER_TICK,
@@ -27,8 +28,6 @@ from setae_protocol.messages import (
 )
 
 CYCLES_PER_MS = 1000 * CYCLES_PER_US
-# The sensor's own oscillator.
-RATE_SPREAD = 0.03
 # Between looks at the pins, so that few edges are at hand at a time.
 _POSES_AT_A_TIME = 50
 _WORKERS = 2

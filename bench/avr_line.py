@@ -6,7 +6,8 @@ import random
 from dataclasses import dataclass
 from itertools import pairwise
 
-from bench.avr import CYCLES_PER_MS, RATE_SPREAD, board
+from bench.avr import CYCLES_PER_MS, board
+from tests.avr.aimed import RATE_SPREAD
 from tests.avr.driver import Driver, Load, Ticks, ramp
 from tests.avr.simavr import AvrTransport, Uno
 

@@ -6,7 +6,8 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bench.avr import CYCLES_PER_MS, RATE_SPREAD, board, frame_start, random_ticks
+from bench.avr import CYCLES_PER_MS, board, frame_start, random_ticks
+from tests.avr.aimed import RATE_SPREAD, Aimed, Range
 from tests.avr.driver import Driver, FramePulses, Load, Ticks, first_still
 from tests.avr.simavr import CYCLES_PER_TICK, CYCLES_PER_US, FRAME_CYCLES, Pulse
 
@@ -21,6 +22,11 @@ _TOUCH_HPA = 1040.0
 _THRESHOLD_HPA = 15.0
 # A sample that is ready so long before a frame must freeze that frame.
 _IN_TIME_CYCLES = 500 * CYCLES_PER_US
+# Before a frame: when the sample of an aimed contact is ready, when the last byte of an aimed stop
+# comes, and when a sample is ready beside it.
+_AIMED_SAMPLE_US = (500.0, 1000.0)
+_AIMED_STOP_US = (500.0, 900.0)
+_SAMPLE_BESIDE_US = (-300.0, 600.0)
 # What the paper's robot uses of its servos' travel.
 _TRAVEL_TICKS = (1660, 4300)
 
@@ -32,8 +38,8 @@ class Freeze:
     Attributes
     ----------
     time_ms
-        From the pressure's step, or the stop's last byte, to the start of the first frame whose
-        pulses no longer move.
+        From the pressure's step, an aimed contact's sample, or the stop's last byte, to the start
+        of the first frame whose pulses no longer move.
     late_frames
         Frames that moved although a sample beyond the threshold was ready 0.5 ms before them.
     stack_bytes
@@ -111,6 +117,30 @@ def stops(count: int, seed: int) -> list[Freeze]:
             driver.forget()
             driver.resume()
     return found
+
+
+def aimed_contacts(count: int, seed: int) -> list[Freeze]:
+    """Touch so that the sample is ready just in time for the next frame."""
+    with board() as driver:
+        aim = Range(driver, random.Random(seed))
+        return [_as_freeze(driver, aim.contact(_AIMED_SAMPLE_US)) for _ in range(count)]
+
+
+def aimed_stops(count: int, seed: int) -> list[Freeze]:
+    """Stop just in time for the next frame, while a sample is being fetched."""
+    with board() as driver:
+        aim = Range(driver, random.Random(seed))
+        return [
+            _as_freeze(driver, aim.stop(_AIMED_STOP_US, _SAMPLE_BESIDE_US)) for _ in range(count)
+        ]
+
+
+def _as_freeze(driver: Driver, aimed: Aimed) -> Freeze:
+    return Freeze(
+        time_ms=aimed.time_ms,
+        late_frames=aimed.frames_late,
+        stack_bytes=driver.uno.statistics().stack_bytes,
+    )
 
 
 def _start_ramp(driver: Driver) -> None:

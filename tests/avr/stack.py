@@ -1,6 +1,9 @@
-"""How deep the firmware's stack gets, over all tests on the simulated UNO.
+"""How deep the firmware's stack gets, over all tests that can run on the simulated UNO.
 
 python -m pytest -p tests.avr.stack tests/avr tests/system/test_both_boards.py
+
+With SETAE_TEST_BACK_END=avr tests of the robot that are else run on the simulator of every day are
+run there, too: see `_ROBOT_TESTS`.
 """
 
 from __future__ import annotations
@@ -13,10 +16,21 @@ from pathlib import Path
 
 import pytest
 from tests.avr.simavr import CYCLES_PER_US, FIRMWARE, ROOT, Uno
+from tests.system.robots import BACK_END_VARIABLE
 
 # Names the file for the figure, where one is wanted.
 _FILE_VARIABLE = "SETAE_STACK_FILE"
 _TESTS = ("tests/avr", "tests/system/test_both_boards.py")
+_KNOWS_ITS_POSE = (
+    "tests/system/test_robot_sim.py::test_a_pose_left_outside_of_the_limits_is_told_with_a_way_out"
+)
+_ROBOT_TESTS = (
+    "tests/system/test_robot_sim.py",
+    "tests/system/test_robot_ways.py",
+    "tests/system/test_lossy_link.py",
+    # An UNO that was just switched on does not.
+    f"--deselect={_KNOWS_ITS_POSE}",
+)
 
 _deepest_bytes = 0
 _boards = 0
@@ -53,9 +67,9 @@ def deepest_in_tests() -> tuple[int, int]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "stack"
         subprocess.run(
-            [sys.executable, "-m", "pytest", "-q", "-p", "tests.avr.stack", *_TESTS],
-            cwd=ROOT, env={**os.environ, _FILE_VARIABLE: str(file)}, check=True,
-            capture_output=True,
+            [sys.executable, "-m", "pytest", "-q", "-p", "tests.avr.stack", *_TESTS, *_ROBOT_TESTS],
+            cwd=ROOT, check=True, capture_output=True,
+            env={**os.environ, _FILE_VARIABLE: str(file), BACK_END_VARIABLE: "avr"},
         )  # fmt: skip
         deepest_bytes, boards = file.read_text().split()
         return int(deepest_bytes), int(boards)

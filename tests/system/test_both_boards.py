@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tests.avr.built import require_built
-from tests.system.robots import WALL_AHEAD, bench, compressed
+from tests.system.robots import WALL_AHEAD, Bench, bench, compressed
 
+from setae.arc import FloatArray
 from setae.config import loads
 from setae.errors import BoardResetError, FaultError, RefusedError, StoppedError
 from setae.experiments.events import Event
 from setae.experiments.explore import explore
+from setae.experiments.targets import Target, choose, paper_targets
+from setae.experiments.validate import validate
 from setae.link.lossy import Faults
 from setae.link.session import Session
 from setae.scene import Obstacle
@@ -126,6 +129,26 @@ def test_a_reset_in_mid_move_is_noticed_and_nothing_goes_on(back_end: str) -> No
             made.robot.move_to((0.0, 0.0, 65.0), duration_s=2.0)
         made.run_without_host(0.5)
         assert made.world.truth().attached == (False,) * 4
+
+
+def test_a_validation_measures_the_same_on_both() -> None:
+    require_built()
+    config = loads("[motion]\nmove_speed_mm_s = 150.0")
+    targets = choose(paper_targets(config), 5)
+    tops_mm = []
+    for back_end in ("sim", "avr"):
+        with bench(back_end=back_end, config=config) as made:
+            made.robot.enable(accept_jump=True)
+
+            def top_mm(_: Target, made: Bench = made) -> FloatArray:
+                return np.array(made.world.truth().backbone_mm[-1])
+
+            poses = validate(made.robot, targets, top_mm, settle_s=0.2)
+            tops_mm.append([pose.position_mm for pose in poses])
+            made.robot.relax()
+    assert np.shape(tops_mm) == (2, len(targets), 3)
+    assert tops_mm[1] == pytest.approx(np.array(tops_mm[0]), abs=0.02)
+    assert np.ptp(tops_mm[1], axis=0).max() > 20.0
 
 
 def test_it_finds_what_is_in_the_tube(back_end: str) -> None:

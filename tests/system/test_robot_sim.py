@@ -28,7 +28,6 @@ from setae.link.lossy import Faults
 from setae.robot import Robot
 from setae.scene import Obstacle
 from setae.servo import segment_messages
-from setae.sim import SensorFault
 from setae_protocol.messages import SERVO_FRAME_US, Refusal, Segment, State
 
 TARGET_MM = (15.0, 0.0, 60.0)
@@ -245,16 +244,17 @@ def test_a_sensor_that_falls_silent_under_guard_is_a_fault_not_a_blind_move() ->
     with compressed() as made:
         robot = made.robot
         start_us = robot.now_us
-        made.at(start_us + 700_000, lambda: made.world.sensor_fault(SensorFault.SILENT))
+        made.at(start_us + 700_000, made.silence_sensor)
         with pytest.raises(FaultError, match="sensor") as failure:
             robot.probe(TARGET_MM, duration_s=2.0)
         assert failure.value.remedy.endswith("Then call resume(), or give `setae enable`.")
+        made.run(0.05)
         held = made.pulses_us()
         made.run(1.0)
         assert made.pulses_us() == pytest.approx(held)
         with pytest.raises(RefusedError):
             robot.resume()
-        made.world.sensor_fault(SensorFault.NONE)
+        made.silence_sensor(False)
         made.run(0.3)
         robot.resume()
         robot.compress(45.0)
@@ -332,7 +332,7 @@ def test_lengths_that_one_servo_may_not_take_are_refused_before_anything_is_sent
     with bench() as made:
         robot = Robot(made.robot.session, narrow)
         robot.prepare()
-        robot.enable()
+        robot.enable(accept_jump=True)
         with pytest.raises(UnreachableError, match="Servo 1"):
             robot.move_lengths([70, 48, 70, 70])
         assert robot.state is State.HOLDING
@@ -355,10 +355,10 @@ def test_a_dead_line_is_told_and_the_board_plays_its_queue_to_the_end_and_holds(
 
 def test_a_board_that_resets_in_mid_move_is_noticed_and_never_goes_on() -> None:
     with compressed() as made:
-        made.at(made.robot.now_us + 300_000, made.world.reset_board)
+        made.at(made.robot.now_us + 300_000, made.reset_board)
         with pytest.raises(BoardResetError):
             made.robot.move_to((0.0, 0.0, 65.0), duration_s=3.0)
-        run_world(made.world, 2)
+        made.run_without_host(2)
         assert made.world.truth().attached == (False,) * 4
 
 
@@ -366,7 +366,7 @@ def test_leaving_the_with_block_relaxes() -> None:
     with compressed() as made:
         with made.robot:
             pass
-        run_world(made.world, 0.04)
+        made.run_without_host(0.04)
         assert made.world.truth().attached == (False,) * 4
         assert made.world.truth().backbone_mm[-1, 2] > 65.0
 
