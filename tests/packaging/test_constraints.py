@@ -39,5 +39,5 @@ def test_what_is_pinned_serves_the_python_of_debian_12() -> None:
              if pinned.get(name_of(each.metadata["Name"])) == each.version]  # fmt: skip
     assert found
     for each in found:
-        asks = each.metadata.json.get("requires_python", "")
+        asks = str(each.metadata.json.get("requires_python", ""))
         assert SpecifierSet(asks).contains("3.11.2"), f"{each.metadata['Name']} asks for {asks}"
