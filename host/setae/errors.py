@@ -190,10 +190,14 @@ class BoardSilentError(LinkError, TimeoutError):
 class ProtocolMismatchError(LinkError):
     """Host and board speak different versions of the protocol.
 
-    Examples of when it happens: setae was updated and the board wasn't.
+    Examples of when it happens: setae was updated, and the board or the compiled
+    simulator wasn't.
     """
 
-    default_remedy = "Flash the firmware of this version with `setae flash`."
+    default_remedy = (
+        "Flash the firmware of this version with `setae flash`; a simulator of another version is "
+        "compiled anew by `make build`."
+    )
 
 
 class LinkLostError(LinkError):

@@ -161,6 +161,7 @@ def test_firmware_of_another_version_names_both_and_the_remedy(
     assert f"protocol {PROTOCOL_VERSION + 1}" in error
     assert f"protocol {PROTOCOL_VERSION} " in error
     assert "setae flash" in error
+    assert "make build" in error  # a simulator that is older was to be flashed
 
 
 @pytest.mark.parametrize(
@@ -283,6 +284,9 @@ def test_flashing_without_sources_or_tools_says_what_is_missing(
     monkeypatch.setattr("shutil.which", lambda *_, **__: None)
     assert "avrdude" in error_of(capsys, "flash", "--hex-file", "some.hex")
     assert "other.hex" in error_of(capsys, "flash", "--hex-file", "other.hex")
+    (tmp_path / "platformio.ini").touch()
+    (tmp_path / "firmware").mkdir()
+    assert "make flash" in error_of(capsys, "flash")
 
 
 @pytest.mark.parametrize(

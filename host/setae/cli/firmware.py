@@ -70,7 +70,7 @@ def _tool(hex_file: Path | None) -> tuple[list[str], Path | None]:
         if not hex_file.is_file():
             raise SetaeError(
                 "PlatformIO is missing, and no hex file was built before.",
-                "Install it: pip install platformio.",
+                "Give `make flash`, which brings it, or install it: pip install platformio.",
             )
     avrdude = _which("avrdude")
     if avrdude is None:
