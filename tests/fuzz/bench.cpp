@@ -96,7 +96,9 @@ void Bench::receive(const uint8_t* wire, size_t size) {
 
 void Bench::poll() {
   step_.before = shot_;
+  polling_ = true;
   board_->poll();
+  polling_ = false;
   shot_ = BoardProbe::look(*board_);
   step_.after = shot_;
   step_.frame_began = step_.after.frame != step_.before.frame;
@@ -130,7 +132,7 @@ void Bench::drain() {
 
 void Bench::on_output(const Output& output) {
   // Limits change only while nothing has pulses, so those of the last poll hold.
-  motion_.on_output(output, shot_.limits);
+  motion_.on_output(output, shot_.limits, polling_);
 }
 
 }  // namespace fuzz

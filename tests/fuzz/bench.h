@@ -51,6 +51,7 @@ class Bench final : Machine::Listener {
   uint64_t sample_due_us_ = 0;
   uint32_t samples_ = 0;
   bool listening_ = true;
+  bool polling_ = false;
   ReferenceDecoder tap_;
   MotionWatch motion_;
   StateWatch state_;

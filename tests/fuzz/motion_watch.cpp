@@ -32,7 +32,7 @@ void check_pairs(const Pulses& pulses, const protocol::SetLimits& limits) {
 
 }  // namespace
 
-void MotionWatch::on_output(const Output& output, const protocol::SetLimits& limits) {
+void MotionWatch::on_output(const Output& output, const protocol::SetLimits& limits, bool polling) {
   // Limp and enable between two frames: the host chose another pose to attach at.
   const bool anew = output.attached == 1;
   bool moved = false;
@@ -60,15 +60,26 @@ void MotionWatch::on_output(const Output& output, const protocol::SetLimits& lim
     expect(enabled_ && attach_mode_, "no servo gets pulses unless enabled");
   if (moved) {
     expect(!frozen_, "nothing moves after a stop, a trip or a fault");
-    expect(motion_mode_, "nothing moves in a mode of rest");
-    expect(segments_ || unwinding_ || reflex_mode_, "nothing moves without an order");
-    if (reflex_mode_)
-      expect(toward_retract(output), "the reflex goes where the guard said");
+    owes_order_ = polling && !(motion_mode_ && is_ordered());
+    owes_retract_ = owes_order_ && !toward_retract(output);
+    if (!owes_order_)
+      check_order(toward_retract(output));
   }
   last_ = output;
   motion_mode_ = moves(mode_);
   attach_mode_ = mode_ == Mode::kAttaching;
   reflex_mode_ = mode_ == Mode::kReflex;
+}
+
+bool MotionWatch::is_ordered() const {
+  return segments_ || unwinding_ || reflex_mode_;
+}
+
+void MotionWatch::check_order(bool toward_retract) const {
+  expect(motion_mode_, "nothing moves in a mode of rest");
+  expect(is_ordered(), "nothing moves without an order");
+  if (reflex_mode_)
+    expect(toward_retract, "the reflex goes where the guard said");
 }
 
 bool MotionWatch::toward_retract(const Output& output) const {
@@ -110,6 +121,9 @@ void MotionWatch::on_step(const Step& step, const Pulses& output) {
     expect(timeout_s != 0 && held_frames >= timeout_s * 50u, "a hold lasts until its time is over");
     unwinding_ = true;
   }
+  if (owes_order_)
+    check_order(!owes_retract_);
+  owes_order_ = false;
   if (before == Mode::kPlaying && mode_ == Mode::kHolding && !step.delivered &&
       step.before.epoch == step.after.epoch) {
     expect(memcmp(output.ticks, end_ticks_, sizeof(end_ticks_)) == 0,

@@ -10,12 +10,15 @@ namespace fuzz {
 class MotionWatch {
  public:
   void on_restart() { *this = MotionWatch(); }
-  void on_output(const Output& output, const protocol::SetLimits& limits);
+  // `polling`: the frame began in the midst of a poll, which may have ordered what it shows.
+  void on_output(const Output& output, const protocol::SetLimits& limits, bool polling);
   void on_step(const Step& step, const Pulses& output);
 
  private:
   void allow(const Step& step);
   void freeze();
+  bool is_ordered() const;
+  void check_order(bool toward_retract) const;
   bool toward_retract(const Output& output) const;
 
   Output last_ = {};
@@ -23,9 +26,11 @@ class MotionWatch {
   bool motion_mode_ = false;  // since the last output
   bool attach_mode_ = false;
   bool reflex_mode_ = false;
-  bool enabled_ = false;    // enable was sent since nothing was attached
-  bool segments_ = false;   // of the running epoch came
-  bool unwinding_ = false;  // relax came, or the hold timed out
+  bool owes_order_ = false;    // moved in a poll that must turn out to have ordered it
+  bool owes_retract_ = false;  // ... and not by the reflex, away from where the guard said
+  bool enabled_ = false;       // enable was sent since nothing was attached
+  bool segments_ = false;      // of the running epoch came
+  bool unwinding_ = false;     // relax came, or the hold timed out
   bool guard_retracts_ = false;
   Mode mode_ = Mode::kRelaxed;
   uint32_t heard_frame_ = 0;
