@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.perception.synthetic import CONFIG, REACH_MM, felt
 
@@ -12,6 +13,7 @@ from setae.config import Config, replaced
 from setae.errors import InputError
 from setae.experiments import samples, scan
 from setae.experiments.shapes import compare
+from setae.heightmap import HeightMap
 from setae.objects import SHAPES, ScanObject, random_object, table_scene
 from setae.perception import cloud, maps
 from setae.report import cluster as pages
@@ -95,3 +97,22 @@ def test_a_report_without_truth_has_no_measures_against_it(
     assert "Chamfer distance" not in page
     with pytest.raises(InputError, match="nothing to compare"):
         compare(found.samples[:2])
+
+
+def test_a_scan_that_ended_early_is_taken_as_far_as_it_goes_and_told(
+    given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A cut log gave four points of a whole scan, and nothing said so."""
+    whole = maps.read(Path(given[0].partition("=")[2]))
+    mark = whole.mark.astype("U9")
+    mark[:3] = "unvisited"
+    height_mm = np.where(mark == "unvisited", np.nan, whole.height_mm)
+    half = maps.write(
+        tmp_path / "half.npz",
+        HeightMap(x_mm=whole.x_mm, y_mm=whole.y_mm, height_mm=height_mm, mark=mark),
+    )
+    with pytest.raises(SystemExit) as ended:
+        main(["cloud", str(half), "--out", str(tmp_path / "out")])
+    assert ended.value.code == 0
+    expected = f"setae: half is not whole: {3 * mark.shape[1]} of {mark.size} places"
+    assert capsys.readouterr().err.startswith(expected)

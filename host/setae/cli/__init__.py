@@ -7,7 +7,9 @@ bug, and keeps it.
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import os
 import sys
 from collections.abc import Sequence
 
@@ -56,6 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         given = sys.argv[1:] if arguments is None else arguments
         code = app(with_plugin(given), exit_on_error=False, print_error=False)
+        sys.stdout.flush()  # what can't be written is to be told here, not at the interpreter's end
     except SetaeError as error:
         _tell(" ".join([str(error), *getattr(error, "__notes__", [])]))
         sys.exit(1)
@@ -67,6 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if error.errno not in (errno.ENOSPC, errno.EIO, errno.EPIPE):
             raise
         _tell(f"The output can't be written: {error.strerror}. Give it another place.")
+        with contextlib.suppress(OSError):  # the rest of it would be tried again
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except KeyboardInterrupt as interrupt:
         _tell(" ".join(getattr(interrupt, "__notes__", None) or ["interrupted"]))

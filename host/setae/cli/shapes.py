@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -44,7 +45,7 @@ def cloud(
     force
         Use --out though it holds files; those of the same names are replaced.
     """
-    found = samples.read_all((run, *more))
+    found = _read(run, *more)
     folder = new_folder("cloud", out, force=force)
     names: set[str] = set()
     for sample in found:
@@ -85,7 +86,7 @@ def cluster(
     report
         Write the report.
     """
-    found = shapes.compare(samples.read_all((run, *more)))
+    found = shapes.compare(_read(run, *more))
     _print_comparison(found)
     if model is not None:
         say(f"Model: {classifier.save(model, found.model)}")
@@ -116,7 +117,7 @@ def classify(run: Path, *more: Path, model: Path) -> None:
     table = Table(box=None, padding=(0, 3, 0, 0))
     for name in ("scan", "is", "sure", "fits", "else"):
         table.add_column(name, justify="right" if name in ("sure", "fits") else "left")
-    for sample in samples.read_all((run, *more)):
+    for sample in _read(run, *more):
         answer = known.answer(_described(sample))
         others = sorted(answer.shares.items(), key=lambda pair: -pair[1])
         second = next(((name, share) for name, share in others if name != answer.nearest), None)
@@ -128,6 +129,20 @@ def classify(run: Path, *more: Path, model: Path) -> None:
             table.add_row(sample.name, "unknown", "", f"{answer.fit:.1%}",
                           f"likest {answer.nearest}")  # fmt: skip
     console.print(table, soft_wrap=True)
+
+
+def _read(*paths: Path) -> list[Sample]:
+    """Read the scans; one that ended early is told, and taken as far as it goes."""
+    found = samples.read_all(paths)
+    for sample in found:
+        unvisited = int((sample.heights.mark == "unvisited").sum())
+        if unvisited:
+            print(
+                f"setae: {sample.name} is not whole: {unvisited} of {sample.heights.mark.size} "
+                "places were not visited.",
+                file=sys.stderr,
+            )
+    return found
 
 
 def _described(sample: Sample) -> FloatArray:
