@@ -56,8 +56,11 @@ void MotionWatch::on_output(const Output& output, const protocol::SetLimits& lim
   const int attached_now = __builtin_popcount(output.attached);
   const int attached_before = __builtin_popcount(last_.attached);
   expect(attached_now <= attached_before + 1, "servos attach one at a time");
-  if (attached_now > attached_before)
-    expect(enabled_ && attach_mode_, "no servo gets pulses unless enabled");
+  if (attached_now > attached_before) {
+    owes_enable_ = polling && !(enabled_ && attach_mode_);
+    if (!owes_enable_)
+      check_enabled();
+  }
   if (moved) {
     expect(!frozen_, "nothing moves after a stop, a trip or a fault");
     owes_order_ = polling && !(motion_mode_ && is_ordered());
@@ -69,6 +72,10 @@ void MotionWatch::on_output(const Output& output, const protocol::SetLimits& lim
   motion_mode_ = moves(mode_);
   attach_mode_ = mode_ == Mode::kAttaching;
   reflex_mode_ = mode_ == Mode::kReflex;
+}
+
+void MotionWatch::check_enabled() const {
+  expect(enabled_ && attach_mode_, "no servo gets pulses unless enabled");
 }
 
 bool MotionWatch::is_ordered() const {
@@ -121,9 +128,11 @@ void MotionWatch::on_step(const Step& step, const Pulses& output) {
     expect(timeout_s != 0 && held_frames >= timeout_s * 50u, "a hold lasts until its time is over");
     unwinding_ = true;
   }
+  if (owes_enable_)
+    check_enabled();
   if (owes_order_)
     check_order(!owes_retract_);
-  owes_order_ = false;
+  owes_enable_ = owes_order_ = false;
   if (before == Mode::kPlaying && mode_ == Mode::kHolding && !step.delivered &&
       step.before.epoch == step.after.epoch) {
     expect(memcmp(output.ticks, end_ticks_, sizeof(end_ticks_)) == 0,

@@ -17,6 +17,7 @@ class MotionWatch {
  private:
   void allow(const Step& step);
   void freeze();
+  void check_enabled() const;
   bool is_ordered() const;
   void check_order(bool toward_retract) const;
   bool toward_retract(const Output& output) const;
@@ -26,6 +27,7 @@ class MotionWatch {
   bool motion_mode_ = false;  // since the last output
   bool attach_mode_ = false;
   bool reflex_mode_ = false;
+  bool owes_enable_ = false;   // a servo got pulses in a poll that must turn out to have enabled it
   bool owes_order_ = false;    // moved in a poll that must turn out to have ordered it
   bool owes_retract_ = false;  // ... and not by the reflex, away from where the guard said
   bool enabled_ = false;       // enable was sent since nothing was attached
