@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pty
 import select
+import struct
 import termios
 import threading
 import tty
@@ -17,6 +19,10 @@ _SLICE_US = 2_000
 # The bootloader's longest answer: to a page that it erases and writes, and the chip's 4 ms.
 _ANSWER_US = 14_000
 _ANSWERS_END = b"\x10"  # STK500's OK
+# inotify.h. With the closings no two in a row are the same, which the kernel would make one.
+_OPENED = 0x20
+_CLOSED = 0x18
+_EVENT = struct.Struct("iIII")  # of a watched file, which has no name
 # By termios' names for them.
 _BAUDS = {
     getattr(termios, name): int(name[1:])
@@ -48,6 +54,7 @@ class UsbPort:
         tty.setraw(self._board)
         self.port = os.ttyname(terminal)
         os.close(terminal)
+        self._watch = _watch_openings(self.port)
         self.openings = 0
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -65,24 +72,27 @@ class UsbPort:
         self._closing.set()
         self._thread.join()
         os.close(self._board)
+        os.close(self._watch)
         self._uno.set_usb_chip(False)
 
     def _run(self) -> None:
         poller = select.poll()
+        poller.register(self._watch, select.POLLIN)
         poller.register(self._board, select.POLLIN)
-        opened = False
         while not self._closing.is_set():
-            found = dict(poller.poll(_SLICE_US / 1000)).get(self._board, 0)
-            if found & select.POLLHUP and not found & select.POLLIN:
-                opened = False
-                self._closing.wait(_SLICE_US / 1e6)
-            elif not opened:
-                opened = True
-                self.openings += 1
-                self._uno.press_reset()
-            if found & select.POLLIN:
+            found = dict(poller.poll(_SLICE_US / 1000))
+            # The kernel counts: who looks at the line alone misses a port that was soon open again.
+            if self._watch in found:
+                for _, event, _, _ in _EVENT.iter_unpack(os.read(self._watch, 4096)):
+                    if event & _OPENED:
+                        self.openings += 1
+                        self._uno.press_reset()
+            line = found.get(self._board, 0)
+            if line & select.POLLIN:
                 self._hand_down(os.read(self._board, 4096))
             else:
+                if line & select.POLLHUP:
+                    self._closing.wait(_SLICE_US / 1e6)
                 self._pass(_SLICE_US)
 
     def _hand_down(self, data: bytes) -> None:
@@ -100,3 +110,12 @@ class UsbPort:
         if data:
             os.write(self._board, data)
         return data
+
+
+def _watch_openings(path: str) -> int:
+    """Return a file that tells each time that `path` is opened or closed."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    watch: int = libc.inotify_init1(os.O_CLOEXEC)
+    if watch < 0 or libc.inotify_add_watch(watch, path.encode(), _OPENED | _CLOSED) < 0:
+        raise OSError(ctypes.get_errno(), f"inotify can't watch {path}")
+    return watch

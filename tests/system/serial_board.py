@@ -42,6 +42,7 @@ class SerialBoard:
         """Give the cable a new end, with a new name."""
         board, self._keeps_open = pty.openpty()
         tty.setraw(board)
+        os.set_blocking(board, False)
         self.port = os.ttyname(self._keeps_open)
         self._board = board  # from here on the thread uses it
 
@@ -92,7 +93,7 @@ class SerialBoard:
             until_us = from_us + round(1e6 * (time.monotonic() - from_s))
             while data := self._world.run(until_us):
                 if self._board >= 0:
-                    os.write(self._board, data)
+                    self._write(data)
             for asked in list(self._asked):
                 if asked[0]():
                     self._asked.remove(asked)
@@ -101,3 +102,9 @@ class SerialBoard:
                 os.close(self._board)
                 self._board = -1
                 self._pulled.set()
+
+    def _write(self, data: bytes) -> None:
+        try:
+            os.write(self._board, data)
+        except BlockingIOError:
+            pass  # nobody reads, and a port's buffer is full: what comes is lost

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from typing import cast
 
 import pytest
 from tests.system.serial_board import SerialBoard
@@ -345,3 +346,22 @@ def test_unplugged_port_is_lost_at_once_and_plugged_in_again_works() -> None:
                 session.open()
                 assert session.state is State.HOLDING
                 session.request(motion(session.epoch, frames=10, to_ticks=START_TICKS))
+
+
+class Talker:
+    """A world whose board says more than a port can keep."""
+
+    now_us = 0
+
+    def __init__(self) -> None:
+        self._left = [bytes(4096)] * 100
+
+    def run(self, until_us: int) -> bytes:
+        return self._left.pop() if self._left else b""
+
+
+def test_a_port_that_nobody_reads_loses_what_comes_and_can_be_unplugged() -> None:
+    """The terminal waited for a reader, and with it the world and who wanted to pull the cable."""
+    with SerialBoard(cast(World, Talker())) as board:
+        board.unplug()
+        board.plug()
