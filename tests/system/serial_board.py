@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import pty
@@ -104,7 +105,6 @@ class SerialBoard:
                 self._pulled.set()
 
     def _write(self, data: bytes) -> None:
-        try:
+        # Where nobody reads, and a port's buffer is full, what comes is lost.
+        with contextlib.suppress(BlockingIOError):
             os.write(self._board, data)
-        except BlockingIOError:
-            pass  # nobody reads, and a port's buffer is full: what comes is lost

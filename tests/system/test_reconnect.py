@@ -356,7 +356,7 @@ class Talker:
     def __init__(self) -> None:
         self._left = [bytes(4096)] * 100
 
-    def run(self, until_us: int) -> bytes:
+    def run(self, _until_us: int) -> bytes:
         return self._left.pop() if self._left else b""
 
 
