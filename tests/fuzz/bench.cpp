@@ -96,6 +96,7 @@ void Bench::receive(const uint8_t* wire, size_t size) {
 
 void Bench::poll() {
   step_.before = shot_;
+  line_.on_poll();
   polling_ = true;
   board_->poll();
   polling_ = false;

@@ -131,8 +131,6 @@ void LineWatch::on_step(const Step& step) {
                step.reading.fresh,
            "segments that are taken and not queued are refused");
   }
-  const bool last_is_new = last_is_new_;
-  last_is_new_ = false;
   if (step.stalled || step.after.session == 0) {
     for (Record& known : records_)
       known.due_tick = ticks_ + kRepeatFrames;
@@ -141,7 +139,7 @@ void LineWatch::on_step(const Step& step) {
   for (Record& known : records_)
     expect(!known.pending || ticks_ <= known.due_tick,
            "a record is repeated until it is acknowledged");
-  if (!last_is_new || !step.quiet())
+  if (!last_is_new_ || !step.quiet())
     return;
   expect(last_.session == step.after.session, "a frame says its session");
   expect(last_.expected == step.after.expected, "a frame acknowledges what was taken");

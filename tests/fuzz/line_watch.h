@@ -21,6 +21,8 @@ class LineWatch {
  public:
   // A record that was not acknowledged is told after a reset too.
   void on_restart(bool powered_off);
+  // What was heard before, by a host that listens again, says nothing of the next step.
+  void on_poll() { last_is_new_ = false; }
   // A byte that the board sent.
   void on_bytes(const uint8_t* wire, size_t size);
   // After the bytes of that step.
@@ -42,8 +44,8 @@ class LineWatch {
   ReferenceDecoder decoder_;
   bool heard_ = false;
   protocol::BoardHeader last_ = {};
-  bool last_is_new_ = false;
-  uint32_t ticks_ = 0;  // frames that the board has seen begin
+  bool last_is_new_ = false;  // of this poll
+  uint32_t ticks_ = 0;        // frames that the board has seen begin
   Record records_[kRecords];
 };
 
