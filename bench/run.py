@@ -49,7 +49,7 @@ from setae_protocol.messages import BOARD_OVERHEAD_BYTES, HOST_OVERHEAD_BYTES  #
 
 RUNS = 3
 RANDOM_TRIALS = 100
-RANDOM_SEED = 20250101
+RANDOM_SEED = 20261122
 ELF = ROOT / ".pio" / "build" / "uno" / "firmware.elf"
 
 
