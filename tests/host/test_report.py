@@ -332,7 +332,8 @@ def test_missing_packages_name_their_extra(
 def test_commands_import_no_report_and_the_report_no_plotting() -> None:
     # The scan's live map took all reports in with every command.
     code = (
-        "import sys, setae.cli; early = [m for m in sys.modules if m.startswith('setae.report')];"
+        "import sys, setae.cli.commands;"
+        " early = [m for m in sys.modules if m.startswith('setae.report')];"
         " import setae.report;"
         " print(early + [m for m in ('matplotlib', 'plotly') if m in sys.modules])"
     )

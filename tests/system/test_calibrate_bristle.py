@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.system.serial_board import SerialBoard
@@ -17,6 +18,7 @@ from setae.cli import main
 from setae.config import load
 from setae.errors import InputError
 from setae.experiments.bristle import Bristle, Move, Threshold, moves_in, surface_mm, threshold
+from setae.report import style
 from setae.scene import open_scene
 from setae.sim import World
 
@@ -32,9 +34,14 @@ def moved(*peaks_hpa: float, touched: bool) -> list[Move]:
 
 
 def test_moves_and_touches_part_near_the_papers_threshold_and_give_a_usable_fragment(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "run"
+    drawn: list[Any] = []
+    save = style.save
+    monkeypatch.setattr(
+        style, "save", lambda figure, path: (drawn.append(figure), save(figure, path))
+    )
     with pytest.raises(SystemExit) as ended:
         main(["calibrate", "bristle", "--sim", "--moves", "12", "--touches", "8",
               "--out", str(out)])  # fmt: skip
@@ -51,6 +58,11 @@ def test_moves_and_touches_part_near_the_papers_threshold_and_give_a_usable_frag
     assert load(out / "bristle.toml").bristle.threshold_hpa == pytest.approx(chosen.hpa, abs=0.06)
     page = (out / "report.html").read_text()
     assert "0 of 12 moves without contact" in page
+    # Its few moves were counted as "6 × 10⁰".
+    histogram = drawn[0].axes[0]
+    ticks = [*histogram.get_yticklabels(), *histogram.get_yticklabels(minor=True)]
+    assert "1" in {tick.get_text() for tick in ticks}
+    assert not any("10^" in tick.get_text() for tick in ticks)
     assert len((out / "moves.csv").read_text().splitlines()) == 21
     # The robot was left alone with nothing in its way.
     assert record.read(out / "bristle.mcap").array("/telemetry", "state")[-1] == "relaxed"

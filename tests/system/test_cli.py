@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -28,7 +31,8 @@ def test_explore_prints_the_table_and_leaves_logs_and_report(
     printed = output_of(
         capsys, "explore", "--sim", "--obstacle", "5", "--azimuth", "90", "--out", str(out)
     )
-    assert "descent 20 mm, 1 contacts" in printed
+    # "1 contacts", it said.
+    assert "descent 20 mm, 1 contact," in printed
     assert "90°" in printed
     log = record.read(out / "trial-1.mcap")
     assert log.damage is None
@@ -43,6 +47,26 @@ def test_explore_prints_the_table_and_leaves_logs_and_report(
     assert "trial_start" in replayed
     assert "trial_end" in replayed
     assert "/trip" in replayed
+
+
+def test_ctrl_c_while_the_commands_are_imported_ends_in_one_line_too() -> None:
+    # In its first second it ended in a traceback.
+    code = (
+        "import signal, sys, types\n"
+        "def stop(name, *_):\n"
+        "    if name == 'cyclopts': signal.raise_signal(signal.SIGINT)\n"
+        "from setae.cli import main\n"
+        "sys.meta_path.insert(0, types.SimpleNamespace(find_spec=stop))\n"
+        "main(['--version'])\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert (ended.returncode, ended.stderr) == (130, "setae: interrupted\n")
 
 
 def test_without_out_the_next_free_folder_is_taken(

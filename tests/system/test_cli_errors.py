@@ -241,6 +241,7 @@ def test_a_configuration_that_is_not_there(capsys: pytest.CaptureFixture[str]) -
         (("--obstacle", "deep"), "deep"),
         (("--obstacle", "-5"), "above 0 mm"),
         (("--obstacle", "nan"), "finite"),
+        (("--obstacle", "0.055"), "in mm"),  # metres were meant, and it ran
         (("--obstacle", "550"), "107 mm"),  # it ran, and touched nothing
         (("--obstacle", "35", "--azimuth", "1e300"), "-360 to 360"),
         (("--obstacle", "35", "--trials", "paper"), "--trials"),

@@ -58,6 +58,7 @@ def test_the_command_scans_in_two_modes_and_reports_them_side_by_side(
         (("--area", "wide"), "is no area. Give mm: --area 200 or --area 120x80."),
         (("--step", "0.1"), "step_mm"),
         (("--area", "2000", "--step", "1"), "Give a longer step or a smaller area"),
+        (("--step", "500"), "Give a shorter step"),  # it scanned a single place
         (("--tallest", "30"), "The simulator knows its own."),
         (("--mode", "paper", "--mode", "paper"), "A --mode is given twice."),
         (("--object", "coil", "--scene", "s.toml"), "exclude each other"),

@@ -233,7 +233,7 @@ def test_the_command_leaves_table_and_report_and_goes_on(
         main(command)
     printed = capsys.readouterr().out
     assert ended.value.code == 0
-    assert "1 of 2 runs are done, 1 failed" in printed
+    assert "1 of 2 runs done, 1 failed" in printed
     assert "Raise the arm" in printed
     page = (out / "report.html").read_text()
     assert "1 of 2 runs failed" in page
@@ -241,7 +241,7 @@ def test_the_command_leaves_table_and_report_and_goes_on(
     with pytest.raises(SystemExit) as ended:
         main([*command, "--no-report"])
     assert ended.value.code == 0
-    assert "1 of 2 runs are done, 1 failed" in capsys.readouterr().out
+    assert "1 of 2 runs done, 1 failed" in capsys.readouterr().out
 
 
 def test_a_missing_extra_is_told_before_anything_runs(

@@ -194,6 +194,7 @@ def test_a_real_robot_waits_for_pictures_and_is_measured_by_a_file(
     [
         (("--sim", "--model", "straight"), "straight"),
         (("--sim", "--targets", "3"), "too few"),
+        (("--sim", "--targets", "146"), "There are 145"),  # it drove all 145
         (("--sim", "--frame", "f.toml"), "--positions"),
         (("--port", "x", "--noise-mm", "1"), "simulated"),
         (("--sim", "--resume"), "--out"),

@@ -7,46 +7,10 @@ bug, and keeps it.
 
 from __future__ import annotations
 
-import contextlib
-import errno
-import os
 import sys
 from collections.abc import Sequence
 
-from cyclopts import CycloptsError
-
-from setae.cli import (
-    calibrate,
-    experiment,
-    firmware,
-    logs,
-    look,
-    robot,
-    scan,
-    shapes,
-    study,
-    validate,
-    workspace,
-)
-from setae.cli.common import app, with_plugin
-from setae.errors import SetaeError
-
-__all__ = ["app", "main"]
-
-# Each adds its commands when it is imported.
-_COMMANDS = (
-    look,
-    robot,
-    experiment,
-    scan,
-    shapes,
-    study,
-    validate,
-    calibrate,
-    logs,
-    workspace,
-    firmware,
-)
+__all__ = ["main", "tell"]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -56,28 +20,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     of the wrong kind. 130: ended by Ctrl-C.
     """
     try:
-        given = sys.argv[1:] if arguments is None else arguments
-        code = app(with_plugin(given), exit_on_error=False, print_error=False)
-        sys.stdout.flush()  # what can't be written is to be told here, not at the interpreter's end
-    except SetaeError as error:
-        _tell(" ".join([str(error), *getattr(error, "__notes__", [])]))
-        sys.exit(1)
-    except CycloptsError as error:
-        _tell(f"{error} Give --help to see what there is.")
-        sys.exit(2)
-    except OSError as error:
-        # What setae reads and writes has errors of its own; this is what it prints.
-        if error.errno not in (errno.ENOSPC, errno.EIO, errno.EPIPE):
-            raise
-        _tell(f"The output can't be written: {error.strerror}. Give it another place.")
-        with contextlib.suppress(OSError):  # the rest of it would be tried again
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        # Here, because Ctrl-C may come in the second that this takes.
+        from setae.cli.commands import run
+
+        code = run(sys.argv[1:] if arguments is None else arguments)
     except KeyboardInterrupt as interrupt:
-        _tell(" ".join(getattr(interrupt, "__notes__", None) or ["interrupted"]))
-        sys.exit(130)
-    sys.exit(code if isinstance(code, int) else 0)
+        tell(" ".join(getattr(interrupt, "__notes__", None) or ["interrupted"]))
+        code = 130
+    sys.exit(code)
 
 
-def _tell(text: str) -> None:
+def tell(text: str) -> None:
+    """Print one line on stderr."""
     print(f"setae: {' '.join(text.split())}", file=sys.stderr)

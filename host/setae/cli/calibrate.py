@@ -17,6 +17,7 @@ from setae.experiments.events import Event
 from setae.record import Recorder
 from setae.scene import open_scene
 from setae.stage import Enter
+from setae.wording import counted
 
 # Below the surface's height, so that the robot can be enabled and relaxed at its free length.
 _RAISED_MM = 30.0
@@ -151,7 +152,7 @@ def _told(recorder: Recorder, show: Callable[[str], None]) -> Callable[[Event], 
     def on_event(event: Event) -> None:
         recorder.experiment(event.time_us, event.name, event.data)
         counts[event.data["touched"]] += 1
-        show(f"{counts[False]} moves without contact, {counts[True]} touches")
+        show(f"{counted(counts[False], 'move')} without contact, {counts[True]} with")
 
     return on_event
 

@@ -15,6 +15,7 @@ from setae.experiments import causes as why
 from setae.experiments import runs
 from setae.experiments.accuracy import Pose, Spread, by_group
 from setae.experiments.targets import Target, commanded_lengths_mm
+from setae.wording import counted
 
 __all__ = ["print_causes", "print_runs", "print_targets"]
 
@@ -35,13 +36,13 @@ def print_runs(found: Sequence[runs.Run]) -> None:
     """Print the errors of each run, or that nothing was measured yet."""
     for run in found:
         if run.poses:
-            say(f"Model {run.model}: {len(run.poses)} targets, {run.source}.")
+            say(f"Model {run.model}: {counted(len(run.poses), 'target')}, {run.source}.")
             say("Errors in mm, mean±SD; in the bending plane, but for the last column:")
             console.print(_table(run.poses))
         else:
             say(
-                f"Model {run.model}: {len(run.visited)} targets driven, none measured. Measure "
-                "the pictures, then give them with --positions and the same --out."
+                f"Model {run.model}: {counted(len(run.visited), 'target')} driven, none measured. "
+                "Measure the pictures, then give them with --positions and the same --out."
             )
 
 

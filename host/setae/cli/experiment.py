@@ -30,6 +30,7 @@ from setae.experiments.explore import ExploreResult, run_trials
 from setae.robot import Robot
 from setae.scene import Obstacle, tube_scene
 from setae.stage import Enter, ManualStage
+from setae.wording import counted
 
 
 @app.command
@@ -116,6 +117,8 @@ def explore(
         write_report(logs, folder())
 
 
+# Nobody places a cube so close: that was meant in metres.
+_LEAST_MM = 1.0
 # A person jogs the arm by hand between two steps.
 _MANUAL_TIMEOUT_S = 600.0
 # Taking the tube apart to fix a cube in it takes longer.
@@ -143,6 +146,11 @@ def _obstacle(config: Config, text: str, azimuth_deg: float) -> Obstacle | None:
             f"--obstacle {text!r} is neither a height in mm nor none.",
             "Give for example --obstacle 55.",
         ) from None
+    if 0 < below_tip_mm < _LEAST_MM:
+        raise InputError(
+            f"--obstacle {text} is less than {_LEAST_MM:g} mm below the tip.",
+            "Give it in mm, for example --obstacle 55.",
+        )
     obstacle = Obstacle(
         below_tip_mm=below_tip_mm, azimuth_deg=azimuth_deg, edge_mm=config.tube.cube_edge_mm
     )
@@ -200,7 +208,7 @@ class _Progress:
             )
         elif event.name == "trial_end":
             console.print(
-                f"  descent {data['descent_mm']:g} mm, {len(data['contacts'])} contacts,"
+                f"  descent {data['descent_mm']:g} mm, {counted(len(data['contacts']), 'contact')},"
                 f" {data['duration_s']:.0f} s"
             )
         elif event.name == "trial_aborted":

@@ -15,6 +15,7 @@ from setae.cli.common import console
 from setae.experiments.events import Event
 from setae.experiments.scan import Place
 from setae.heightmap import TOUCHED
+from setae.wording import counted
 
 _REDRAW_S = 0.1
 # Without a terminal: a line each time so much more of the places is known.
@@ -76,8 +77,8 @@ class LiveMap:
         took_s = (time_us - self._start_us) / 1e6
         left_s = took_s / max(known - self._before, 1) * (total - known)
         line = (
-            f"{known / total:4.0%}  {known} of {total} places, {self._touched()} touched,"
-            f" {_clock(took_s)} robot time, about {_clock(left_s)} left"
+            f"{known / total:4.0%}  {known} of {counted(total, 'place')}, "
+            f"{self._touched()} touched, {_clock(took_s)} robot time, about {_clock(left_s)} left"
         )
         if self._live is None:
             if known / total >= self._told_share + _LINE_SHARE or known == total:

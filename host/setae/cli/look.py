@@ -14,6 +14,7 @@ from setae import rig
 from setae.cli.common import Where, app, connected, console
 from setae.errors import SetaeError
 from setae.robot import Robot
+from setae.wording import counted
 from setae_protocol.messages import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
@@ -193,8 +194,10 @@ def _check_status(robot: Robot, checks: _Checks) -> None:
     else:
         checks.good("supply", supply)
     counts = (
-        f"{status.rx_framing_errors} framing errors, {status.rx_overruns} overruns,"
-        f" {status.rx_overflows} without room, {status.late_pulses} late pulse edges"
+        f"{counted(status.rx_framing_errors, 'framing error')}, "
+        f"{counted(status.rx_overruns, 'overrun')}, "
+        f"{status.rx_overflows} without room, "
+        f"{counted(status.late_pulses, 'late pulse edge')}"
     )
     if status.rx_framing_errors or status.rx_overruns or status.rx_overflows:
         checks.bad("board's line", f"{counts}. Use a short USB cable, away from the servo leads.")

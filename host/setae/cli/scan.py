@@ -30,6 +30,7 @@ from setae.objects import TableScene, UnknownScene, of_description, random_objec
 from setae.robot import Robot
 from setae.stage import Enter, ManualStage
 from setae.ur import UrStage
+from setae.wording import counted
 
 # A person moves the arm by hand between two places, or brings it to the first.
 _MANUAL_TIMEOUT_S = 3600.0
@@ -285,7 +286,7 @@ class _Scanning:
 
     def _one(self, job: _Job) -> ScanResult:
         what = "the surface" if job.scene is None else _name(job.scene)
-        begun = "" if job.known is None else f", from {job.known_places} known places on"
+        begun = "" if job.known is None else f", from {counted(job.known_places, 'known place')} on"
         console.print(f"Scan of {what}, mode {job.mode}{begun}")
         with LiveMap() as live, self._ready(job) as (opened, recorder):
             if job.known is not None:

@@ -17,6 +17,7 @@ from setae.experiments import samples, shapes
 from setae.experiments.samples import Sample
 from setae.perception import classifier, features, maps
 from setae.perception import cloud as clouds
+from setae.wording import counted
 
 Format = Literal["ply", "csv", "npy", "npz", "map"]
 
@@ -56,7 +57,7 @@ def cloud(
                 path = maps.write(folder / f"{name}-map.npz", sample.heights)
             else:
                 path = clouds.write(folder / f"{name}.{kind}", points)
-            say(f"{path}: {len(points.points_mm)} points")
+            say(f"{path}: {counted(len(points.points_mm), 'point')}")
 
 
 @app.command

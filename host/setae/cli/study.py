@@ -13,6 +13,7 @@ from setae.cli.common import Flag, app, console, new_folder
 from setae.cli.runs import say
 from setae.errors import ExtraMissingError, InputError, SetaeError
 from setae.experiments import study as studies
+from setae.wording import counted
 
 Several = Annotated[list[str] | None, Parameter(negative="")]
 
@@ -88,7 +89,7 @@ def study(
     rows = _conduct(plan.runs(), folder, workers, scheduler)
     table = studies.write_table(folder / "table.parquet", rows)
     failed = [row for row in rows if row["status"] != "done"]
-    say(f"{len(rows) - len(failed)} of {len(rows)} runs are done, {len(failed)} failed.")
+    say(f"{len(rows) - len(failed)} of {counted(len(rows), 'run')} done, {len(failed)} failed.")
     for row in failed[:5]:
         say(f"  {row['run']}: {row['error']}")
     if len(failed) > 5:
@@ -132,4 +133,4 @@ def _conduct(
 
 
 def _left(kept: Sequence[studies.Row], folder: Path) -> str:
-    return f"{len(kept)} runs are kept. The same command with --out {folder} goes on."
+    return f"{counted(len(kept), 'run')} kept. The same command with --out {folder} goes on."

@@ -63,7 +63,7 @@ def validate_command(
         Tendon model: paper, parallel or taut. Several times: one after the other, side
         by side in the report. Without it the configuration's.
     targets
-        Only so many targets, evenly spread over the groups.
+        Drive only so many of the 145, evenly spread over the five groups; 5 at least.
     positions
         File with measured positions: columns target, x_mm, y_mm, z_mm, or ImageJ's
         table of results. GROUP=FILE for one whose rows are a group's targets in their

@@ -24,6 +24,7 @@ from setae.errors import InputError
 from setae.experiments.accuracy import Pose
 from setae.experiments.targets import GROUPS, Target, find
 from setae.experiments.view import Frame
+from setae.wording import counted
 
 __all__ = ["named", "read"]
 
@@ -119,8 +120,8 @@ def read(
     if by_order and len(body) != len(order):
         what = f"group {group}" if group else "the run"
         raise InputError(
-            f"{path} has {len(body)} rows without names of targets, and {what} has "
-            f"{len(order)} targets.",
+            f"{path} has {counted(len(body), 'row')} without names of targets, and "
+            f"{what} has {counted(len(order), 'target')}.",
             "Name the target of each row, such as +X z40 b10, or give GROUP=FILE.",
         )
     poses: list[Pose] = []

@@ -126,12 +126,12 @@ def _towards(group: str, lateral_mm: float, height_mm: float) -> tuple[float, fl
 
 
 def choose(targets: Sequence[Target], count: int) -> tuple[Target, ...]:
-    """Choose some targets, evenly spread over each group; a group keeps one at least.
+    """Choose so many targets, evenly spread over each group; a group keeps one at least.
 
     Raises
     ------
     InputError
-        Fewer than one a group.
+        Fewer than one a group, or more than there are.
 
     Examples
     --------
@@ -141,10 +141,17 @@ def choose(targets: Sequence[Target], count: int) -> tuple[Target, ...]:
     """
     if count < len(GROUPS):
         raise InputError(f"{count} targets are too few.", f"Give {len(GROUPS)} or more.")
+    if count > len(targets):
+        raise InputError(
+            f"{count} targets are too many.", f"There are {len(targets)}: give no more."
+        )
     by_group = [[target for target in targets if target.group == group] for group in GROUPS]
+    shares = np.array([count * len(part) / len(targets) for part in by_group])
+    sizes = np.ones(len(GROUPS), dtype=int)
+    while sizes.sum() < count:
+        sizes[np.argmax(shares - sizes)] += 1  # to the group that lacks most
     chosen: list[Target] = []
-    for part in by_group:
-        some = max(1, round(count * len(part) / len(targets)))
+    for part, some in zip(by_group, sizes, strict=True):
         last = len(part) - 1
         places = np.linspace(0, last, some) if some > 1 else np.array([last / 2])
         chosen += [part[int(place)] for place in places.round()]

@@ -18,6 +18,7 @@ from setae.arc import FloatArray
 from setae.errors import InputError
 from setae.heightmap import HeightMap
 from setae.perception import maps
+from setae.wording import counted
 
 __all__ = ["FEATURES", "FEWEST", "Feature", "described", "scaled"]
 
@@ -108,7 +109,7 @@ def described(heights: HeightMap) -> FloatArray:
     points = maps.known(heights)
     if len(points) < FEWEST:
         raise InputError(
-            f"The scan has {len(points)} heights, and a shape needs {FEWEST}.",
+            f"The scan has {counted(len(points), 'height')}, and a shape needs {FEWEST}.",
             "Scan the whole object, or with a smaller step.",
         )
     cell_mm2 = _step_mm(heights.x_mm) * _step_mm(heights.y_mm)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from setae.config import Config, loads
 from setae.errors import ConfigError, InputError, LogError
 from setae.record.topics import TOPICS
+from setae.wording import counted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,9 +40,9 @@ class Damage:
     last_time_us: int
 
     def __str__(self) -> str:
-        lost = [f"{self.bytes_lost} bytes could not be read"] if self.bytes_lost else []
+        lost = [f"{counted(self.bytes_lost, 'byte')} could not be read"] if self.bytes_lost else []
         if self.chunks_lost:
-            lost.append(f"{self.chunks_lost} broken blocks of up to 1 s each were left out")
+            lost.append(f"{counted(self.chunks_lost, 'broken block')} of up to 1 s each left out")
         lost.append(f"the last message is from {self.last_time_us / 1e6:.3f} s")
         return f"{self.reason}: {', '.join(lost)}"
 

@@ -13,8 +13,9 @@ import numpy as np
 from setae.errors import LogError
 from setae.experiments.bristle import EXPERIMENT, Move, Threshold, moves_in, rates, threshold
 from setae.record import Log, read
-from setae.report import files, palette, style, template
+from setae.report import extras, files, palette, style, template
 from setae.report.files import Report
+from setae.wording import counted
 
 __all__ = ["finding", "picture", "write"]
 
@@ -99,14 +100,15 @@ def picture(path: Path, log: Log) -> Path:
     free = np.array([move.peak_hpa for move in moves if not move.touched])
     touches = np.array([move.peak_hpa for move in moves if move.touched])
     most = 1.08 * max(float(touches.max()), configured, float(free.max()))
+    ticker = extras.load("matplotlib.ticker")
     with style.used():
         figure = style.figure(12.4, 7.4)
         figure.text(0.02, 0.955, "When the bristle touches something", fontsize=16, weight="bold",
                     va="center")  # fmt: skip
         figure.text(
             0.02, 0.915,
-            f"Largest change of pressure in {len(free)} moves without contact and {len(touches)} "
-            f"touches. {_note(log)}",
+            f"Largest change of pressure in {counted(len(free), 'move')} without contact and "
+            f"{len(touches)} with. {_note(log)}",
             fontsize=10, color=palette.MUTED, va="center",
         )  # fmt: skip
         whole = figure.add_axes((0.065, 0.5, 0.915, 0.335))
@@ -114,6 +116,9 @@ def picture(path: Path, log: Log) -> Path:
         whole.hist(free, edges, color=palette.PRESSURE, alpha=0.85, label="without contact")
         whole.hist(touches, edges, color=palette.CONTACT, alpha=0.75, label="touches")
         whole.set_yscale("log")
+        # Plain numbers, where the axis by itself writes 6 × 10⁰.
+        whole.yaxis.set_major_formatter(ticker.LogFormatter())
+        whole.yaxis.set_minor_formatter(ticker.LogFormatter())
         whole.set_ylabel("moves")
         _lines(whole, chosen.hpa, configured)
         whole.set_xlim(0, most)

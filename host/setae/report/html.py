@@ -15,6 +15,7 @@ from setae.report import drawing, extras, imperfections, palette, paper, shapes,
 from setae.report.scene import floor_mm
 from setae.report.tables import Comparison, compare
 from setae.report.trial import Trial, origin_note
+from setae.wording import counted
 
 FRAMES_PER_S = 8.0  # the page draws straight lines in between
 POINT_STEP_MM = 0.05  # 16 bits then reach 1.6 m
@@ -68,7 +69,7 @@ def finding(rows: Sequence[Comparison]) -> str:
     if with_obstacle:
         found = sum(row.trial.touched for row in with_obstacle)
         sentences.append(
-            f"the bristle found the obstacle in {found} of {len(with_obstacle)} trials"
+            f"the bristle found the obstacle in {found} of {counted(len(with_obstacle), 'trial')}"
         )
     if without:
         false = sum(row.trial.touched for row in without)

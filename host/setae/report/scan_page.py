@@ -13,6 +13,7 @@ from setae.heightmap import TOUCHED
 from setae.report import extras, palette, template
 from setae.report.scan_pictures import cloud, top_mm
 from setae.report.scan_reading import Scan
+from setae.wording import counted
 
 _PICTURES: Final = {
     "heights": "Height maps from above, with flags, the true surface and the errors",
@@ -67,7 +68,7 @@ def finding(scans: Sequence[Scan]) -> str:
     for scan in scans:
         marks = scan.result.height_map.mark
         touched = int(np.isin(marks, TOUCHED).sum())
-        text = f"{scan.result.mode}: {touched} of {marks.size} places touched"
+        text = f"{scan.result.mode}: {touched} of {counted(marks.size, 'place')} touched"
         if scan.result.mode == "adaptive":
             text += f", {int((marks == 'inferred').sum())} inferred"
         text += f", in {scan.result.duration_s:.0f} s of robot time"

@@ -15,6 +15,7 @@ from setae.heightmap import HeightMap
 from setae.perception import maps
 from setae.report import clouds, files, palette, style, template
 from setae.report.files import Report
+from setae.wording import counted
 
 __all__ = ["measures_picture", "runs_picture", "write"]
 
@@ -91,8 +92,8 @@ def measures_picture(path: Path, done: Sequence[Row], varied: Sequence[str]) -> 
         figure = style.figure(13.0, height)
         figure.text(0.015, 1 - 0.15 / height, "What the runs gave", fontsize=15, weight="bold",
                     va="top")  # fmt: skip
-        figure.text(0.015, 1 - 0.5 / height, f"Simulated. {len(done)} runs; a dot is a run, a bar "
-                    "the middle one.", fontsize=10, color=palette.MUTED, va="top")  # fmt: skip
+        note = f"Simulated. {counted(len(done), 'run')}; a dot is a run, a bar the middle one."
+        figure.text(0.015, 1 - 0.5 / height, note, fontsize=10, color=palette.MUTED, va="top")
         grid = figure.add_gridspec(1, len(_MEASURES), left=0.045, right=0.99, wspace=0.2,
                                    bottom=(0.65 + 0.26 * len(cases)) / height,
                                    top=1 - 0.95 / height)  # fmt: skip
@@ -185,9 +186,8 @@ def _page(rows: Sequence[Row], varied: Sequence[str], drawn: Sequence[Path]) -> 
     failed = [row for row in rows if row["status"] != "done"]
     badges = '<span class="badge">Simulated: no hardware</span>'
     if failed:
-        badges += (
-            f'<span class="badge warn">{len(failed)} of {len(rows)} runs failed; see below</span>'
-        )
+        text = f"{len(failed)} of {counted(len(rows), 'run')} failed; see below"
+        badges += f'<span class="badge warn">{text}</span>'
     words = ("What each measure came to, by object", "Height maps of the runs")
     pictures = [template.image(path, text) for path, text in zip(drawn, words, strict=False)] + [
         "",
@@ -199,8 +199,9 @@ def _page(rows: Sequence[Row], varied: Sequence[str], drawn: Sequence[Path]) -> 
         "study.html",
         {
             "badges": badges,
-            "finding": f"{len(rows) - len(failed)} of {len(rows)} runs are done: {shapes} "
-            f"objects, {seeds} seeds, {len({_case(row, varied) for row in rows})} combinations.",
+            "finding": f"{len(rows) - len(failed)} of {counted(len(rows), 'run')} done: "
+            f"{counted(shapes, 'object')}, {counted(seeds, 'seed')}, "
+            f"{counted(len({_case(row, varied) for row in rows}), 'combination')}.",
             "measures": pictures[0],
             "maps": pictures[1],
             "cases": _cases(rows, varied),

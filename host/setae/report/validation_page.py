@@ -14,6 +14,7 @@ from setae.experiments.accuracy import OVERALL, Spread, Summary, by_group
 from setae.experiments.runs import Run
 from setae.report import extras, palette, paper, template
 from setae.report.validation_pictures import COLOURS, origin_note
+from setae.wording import counted
 
 _PICTURES: Final = {
     "boxes": "Box plots of the errors of the five groups beside the paper's means",
@@ -67,7 +68,7 @@ def finding(runs: Sequence[Run]) -> str:
     for run in runs:
         whole = by_group(run.poses)[OVERALL]
         parts.append(f"{_spread(whole.in_plane)} mm with the model {run.model}")
-    count = f"{len(runs[0].poses)} of {len(runs[0].targets)} targets"
+    count = f"{len(runs[0].poses)} of {counted(len(runs[0].targets), 'target')}"
     text = f"Mean error in the bending plane, over {count}: {'; '.join(parts)}. "
     text += f"The paper’s robot: {_spread(theirs)} mm."
     run = runs[0]
@@ -75,7 +76,7 @@ def finding(runs: Sequence[Run]) -> str:
     if 0 < holds.sum() < len(holds):
         errors = np.array([pose.in_plane_mm for pose in run.poses])
         text += (
-            f" On the {int(holds.sum())} targets that tendons can hold it is "
+            f" On the {counted(int(holds.sum()), 'target')} that tendons can hold it is "
             f"{errors[holds].mean():.2f} mm, on the {int((~holds).sum())} that would need a tendon "
             f"that pushes {errors[~holds].mean():.2f} mm (model {run.model})."
         )
@@ -154,7 +155,7 @@ _SIMULATED: Final = (
 def _origin(runs: Sequence[Run]) -> str:
     rows: list[tuple[str, str]] = []
     for run in runs:
-        visited = f"{len(run.poses)} of {len(run.targets)} targets"
+        visited = f"{len(run.poses)} of {counted(len(run.targets), 'target')}"
         rows.append((f"model {run.model}", f"{visited}; positions: {run.source}"))
         if run.cut_mm:
             rows.append(

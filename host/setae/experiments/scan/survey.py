@@ -85,7 +85,7 @@ class Survey:
     Raises
     ------
     InputError
-        So many places would take days.
+        So many places would take days, or the step is longer than the area.
 
     Examples
     --------
@@ -107,6 +107,12 @@ class Survey:
             raise InputError(
                 f"The scan would have {self.columns} × {self.rows} places.",
                 f"Give a longer step or a smaller area: at most {_PLACES_MAX} places.",
+            )
+        if settings.step_mm > max(settings.area_mm) > 0:
+            width_mm, depth_mm = settings.area_mm
+            raise InputError(
+                f"A step of {settings.step_mm:g} mm leaves {width_mm:g} × {depth_mm:g} mm at once.",
+                "Give a shorter step; for a single place, an area of 0.",
             )
         self._known: dict[Cell, Place] = {}
 
