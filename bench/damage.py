@@ -56,8 +56,8 @@ def fuzzing() -> Iterable[Figure]:
         sum(run["crashes"] for run in last),
         "inputs",
         "of all those: on which the code under test crashed or broke a promise; versions before:"
-        f" {sum(run['crashes'] for run in before)}, and"
-        f" {sum(run.get('false_alarms', 0) for run in before)} at which an observer was wrong"
+        f" {sum(run['crashes'] for run in before)}. At"
+        f" {sum(run.get('false_alarms', 0) for run in runs)} of all an observer was wrong"
         + "".join(f" ({note})" for note in notes),
     )
 

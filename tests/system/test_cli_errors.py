@@ -330,12 +330,13 @@ def test_a_scan_that_the_robot_can_not_reach_is_told_before_anything_moves(
     assert not out.exists()
 
 
-def test_an_output_that_takes_nothing_is_no_bug_of_setae() -> None:
+@pytest.mark.parametrize("arguments", [("info", "--sim"), ("validate", "--list", "--targets", "5")])
+def test_an_output_that_takes_nothing_is_no_bug_of_setae(arguments: tuple[str, ...]) -> None:
     """A full disk behind `>` gave a traceback; buffered, as is usual, Python's own code."""
     env = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with Path("/dev/full").open("w") as full:
         ended = subprocess.run(
-            [sys.executable, "-m", "setae.cli", "info", "--sim"],
+            [sys.executable, "-m", "setae.cli", *arguments],
             stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=env,
         )  # fmt: skip
     assert ended.returncode == 1

@@ -48,8 +48,9 @@ _COMMANDS = (
 def run(arguments: Sequence[str]) -> int:
     """Run one command, tell its error in one line, and return the exit code."""
     try:
-        code = app(with_plugin(arguments), exit_on_error=False, print_error=False)
-        sys.stdout.flush()  # what can't be written is to be told here, not at the interpreter's end
+        code = _code_of(arguments)
+        if sys.stdout is not None:  # else it was closed
+            sys.stdout.flush()  # what can't be written is to be told here, not at Python's end
     except SetaeError as error:
         tell(" ".join([str(error), *getattr(error, "__notes__", [])]))
         return 1
@@ -65,3 +66,11 @@ def run(arguments: Sequence[str]) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     return code if isinstance(code, int) else 0
+
+
+def _code_of(arguments: Sequence[str]) -> object:
+    """What a command returns, or exits with: later versions of cyclopts exit by themselves."""
+    try:
+        return app(with_plugin(arguments), exit_on_error=False, print_error=False)
+    except SystemExit as ended:
+        return ended.code
