@@ -163,6 +163,26 @@ def test_a_run_without_the_log_that_is_to_be_kept_is_done_again(tmp_path: Path) 
     assert done == [False, True]
 
 
+def test_a_run_that_failed_to_keep_its_log_is_done_again(tmp_path: Path) -> None:
+    # The line of the same run without a log vouched for the half of the files that was written.
+    done: list[bool] = []
+
+    def quick(run: Run) -> Outcome:
+        done.append(run.keep_log)
+        files = {"scan.mcap": b"log", "map.npz": b"map"} if run.keep_log else {}
+        return Outcome(row={"run": run.name, "status": "done"}, files=files)
+
+    plain, logged = plan().runs(), plan(keep_logs=True).runs()
+    conduct(plain, tmp_path, workers=1, task=quick)
+    in_the_way = tmp_path / study.RUNS / plain[0].name / "map.npz"
+    in_the_way.mkdir()
+    with pytest.raises(SetaeError):
+        conduct(logged, tmp_path, workers=1, task=quick)
+    in_the_way.rmdir()
+    conduct(logged, tmp_path, workers=1, task=quick)
+    assert done == [False, True, True]
+
+
 def test_the_name_of_a_run_changes_with_all_that_it_is_made_of() -> None:
     base = plan().runs()[0]
     others = [

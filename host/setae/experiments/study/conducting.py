@@ -130,6 +130,8 @@ def finished(folder: Path, run: Run) -> Row | None:
 def _keep(folder: Path, outcome: Outcome) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        # An earlier line, of the run without its log, would vouch for files half written.
+        (folder / _ROW).unlink(missing_ok=True)
         for name, content in outcome.files.items():
             (folder / name).write_bytes(content)
         unfinished = folder / f"{_ROW}.part"
