@@ -185,7 +185,7 @@ def test_an_unreachable_target(
         ("[geometry]\ntendon_radius = 8.0\n", "tendon_radius_mm"),
         ("[geometry\n", "TOML"),
         ("[explore]\nsteps = -1\n", "steps"),
-        ("[simulator]\nno_such_thing = 1.0\n", "parameter_names() lists all"),  # was told a source file
+        ("[simulator]\nno_such_thing = 1.0\n", "parameter_names() has all"),
         ('[simulator]\n"tendon.frictoin" = 0.1\n', "Did you mean 'tendon.friction'?"),
     ],
 )

@@ -137,7 +137,7 @@ class World:
             close = difflib.get_close_matches(name, names, n=1)
             raise InputError(
                 f"The simulator has no parameter {name!r}.",
-                f"Did you mean {close[0]!r}?" if close else "setae.sim.parameter_names() lists all.",
+                f"Did you mean {close[0]!r}?" if close else "setae.sim.parameter_names() has all.",
             )
         self._change(self._library.setae_world_set(self._live, name.encode(), value))
 
