@@ -95,6 +95,11 @@ def _ask(driver: Driver, tap: _Tap, token: int) -> int:
 
     The board answers the last ping of those that came together: where that was the session's own,
     this one is asked again.
+
+    Raises
+    ------
+    TimeoutError
+        No ping was answered.
     """
     uno = driver.uno
     while True:
@@ -107,6 +112,8 @@ def _ask(driver: Driver, tap: _Tap, token: int) -> int:
         )
         if token in tap.pongs:
             return tap.pongs[token] - sent
+        if max(tap.pongs.values(), default=0) < sent:
+            raise TimeoutError(f"the board answers no ping: {token:#x}")
 
 
 def refills(count: int, seed: int) -> list[Timed]:

@@ -31,7 +31,7 @@ RUNS: Final = "runs"
 _ROW: Final = "row.json"
 _CONNECT_S: Final = 10
 # Of workers on this machine: a sampling profiler that nobody reads, and looks at the loop and the
-# memory many times a second, would take a twelfth of the cores from runs of many seconds.
+# memory many times a second, would take some of the cores from runs of many seconds.
 _FEW_LOOKS: Final = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
