@@ -39,9 +39,12 @@ def test_moves_and_touches_part_near_the_papers_threshold_and_give_a_usable_frag
     out = tmp_path / "run"
     drawn: list[Any] = []
     save = style.save
-    monkeypatch.setattr(
-        style, "save", lambda figure, path: (drawn.append(figure), save(figure, path))
-    )
+
+    def draw(figure: Any, path: Any) -> None:
+        drawn.append(figure)
+        save(figure, path)
+
+    monkeypatch.setattr(style, "save", draw)
     with pytest.raises(SystemExit) as ended:
         main(["calibrate", "bristle", "--sim", "--moves", "12", "--touches", "8",
               "--out", str(out)])  # fmt: skip
