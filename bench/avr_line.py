@@ -105,15 +105,18 @@ def _ask(driver: Driver, tap: _Tap, token: int) -> int:
     while True:
         sent = max(uno.cycle, uno.line_free)
         uno.send(encode_host(Ping(token=token), session=driver.session_id))
-        until_us = driver.session.now_us + 100_000
-        driver.session.run_until(
-            lambda: token in tap.pongs or driver.session.now_us > until_us,  # noqa: B023  # only here
-            200_000,
-        )
+        _await_pong(driver, tap, token)
         if token in tap.pongs:
             return tap.pongs[token] - sent
         if max(tap.pongs.values(), default=0) < sent:
             raise TimeoutError(f"the board answers no ping: {token:#x}")
+
+
+def _await_pong(driver: Driver, tap: _Tap, token: int) -> None:
+    until_us = driver.session.now_us + 100_000
+    driver.session.run_until(
+        lambda: token in tap.pongs or driver.session.now_us > until_us, 200_000
+    )
 
 
 def refills(count: int, seed: int) -> list[Timed]:
