@@ -51,6 +51,8 @@ class Controls:
         # What the last motion was to reach: under `paper` the lengths alone leave that open.
         self._aim: Arc | None = None
         self._aim_model = config.motion.model
+        # The last pose that was asked for, behind all that it was made of.
+        self._fitted: tuple[tuple[Ticks, str, Arc | None], Arc] | None = None
         self._board = Board(session)
 
     # ------------------------------------------------------------------- life
@@ -151,9 +153,14 @@ class Controls:
         PoseUnknownError
             Nobody knows them before the first enable().
         """
+        return self._planner.servos.lengths_mm(self._ticks)
+
+    @property
+    def _ticks(self) -> Ticks:
+        """Commanded pulses, of known meaning."""
         if not self.pose_known:
             raise PoseUnknownError("Nobody knows where the servos are.")
-        return self._planner.servos.lengths_mm(self.telemetry.pulse_ticks)
+        return self.telemetry.pulse_ticks
 
     @property
     def pose(self) -> Arc:
@@ -162,9 +169,14 @@ class Controls:
         Of several that do, the one nearest to the last target. In the tendon model that
         the last move was made with.
         """
-        return kinematics.forward(
-            self.lengths_mm, self.config.geometry, model=self._aim_model, near=self._aim
-        )
+        asked = (self._ticks, self._aim_model, self._aim)
+        # A scan asks many times between two motions, and a fit takes milliseconds.
+        if self._fitted is None or self._fitted[0] != asked:
+            arc = kinematics.forward(
+                self.lengths_mm, self.config.geometry, model=self._aim_model, near=self._aim
+            )
+            self._fitted = asked, arc
+        return self._fitted[1]
 
     @property
     def position_mm(self) -> npt.NDArray[np.float64]:

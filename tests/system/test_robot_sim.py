@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tests.system.robots import WALL_AHEAD, Bench, bench, compressed, run_world
 
+from setae import kinematics
 from setae.config import loads
 from setae.errors import (
     BoardResetError,
@@ -132,6 +133,20 @@ def test_the_robot_tells_the_pose_that_was_commanded() -> None:
         assert robot.position_mm == pytest.approx((20.0, 5.0, 55.0), abs=0.1)
         robot.circle(15.0, 60.0, turns=0.25, model="parallel")
         assert robot.position_mm == pytest.approx((0.0, 15.0, 60.0), abs=0.1)
+
+
+def test_the_pose_is_told_anew_where_only_the_motion_s_meaning_changed() -> None:
+    with compressed() as made:
+        robot = made.robot
+        robot.move_to((20.0, 5.0, 55.0), model="taut")
+        assert robot.position_mm == pytest.approx((20.0, 5.0, 55.0), abs=0.1)
+        before = robot.telemetry.pulse_ticks
+        robot.move_lengths(robot.lengths_mm)
+        assert robot.telemetry.pulse_ticks == before
+        lengths_mm, config = robot.lengths_mm, robot.config
+        arc = kinematics.forward(lengths_mm, config.geometry, model=config.motion.model)
+        assert robot.position_mm.tolist() == kinematics.position(arc).tolist()
+        assert robot.position_mm != pytest.approx((20.0, 5.0, 55.0), abs=0.5)
 
 
 def test_a_probe_into_free_space_ends_at_its_target() -> None:
