@@ -36,18 +36,22 @@ def cobs_decode(data: bytes) -> bytes | None:
     >>> cobs_decode(bytes([0x05, 0x11])) is None
     True
     """
+    if 0 in data:
+        return None
     size = len(data)
-    out = bytearray()
+    # Each code tells where the next one is, and but for the first it stands where a zero was;
+    # one behind a full block stands for nothing.
+    out = bytearray(data)
+    full = []
     index = 0
     while index < size:
         code = data[index]
-        end = index + code
-        if code == 0 or end > size:
-            return None
-        out += data[index + 1 : end]
-        index = end
-        if code != 255 and index < size:
-            out.append(0)
-    if 0 in data:
+        out[index] = 0
+        index += code
+        if code == 255 and index < size:
+            full.append(index)
+    if index > size:
         return None
-    return bytes(out)
+    for place in reversed(full):
+        del out[place]
+    return bytes(out[1:])
