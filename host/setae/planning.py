@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -21,6 +22,9 @@ from setae.trajectory.plan import TooFast
 from setae_protocol.messages import SERVO_FRAME_US, Segment, SetLimits
 
 Begun = tuple[FloatArray, trajectory.FrameTrajectory]
+
+# Questions of one kind; a plan of many segments takes some kilobytes.
+_REMEMBERED = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +53,9 @@ class Planner:
     def __init__(self, config: Config) -> None:
         self.servos = servo.ServoModel(config)
         self._config = config
+        # A scan goes between a few lengths hundreds of times.
+        self._reach = lru_cache(maxsize=_REMEMBERED)(self._reach_anew)
+        self._line = lru_cache(maxsize=_REMEMBERED)(self._line_anew)
 
     @property
     def limits(self) -> SetLimits:
@@ -69,7 +76,13 @@ class Planner:
         position = finite_array("position_mm", position_mm, last_axis=3, what="x, y, z")
         if position.shape != (3,):
             raise InputError(f"position_mm has shape {position.shape}.", "Give one x, y, z.")
-        return workspace.require(kinematics.inverse(position), self._config, model)
+        x_mm, y_mm, z_mm = position.tolist()
+        return self._reach(x_mm, y_mm, z_mm, model)
+
+    def _reach_anew(self, x_mm: float, y_mm: float, z_mm: float, model: str | None) -> FloatArray:
+        lengths_mm = workspace.require(kinematics.inverse((x_mm, y_mm, z_mm)), self._config, model)
+        lengths_mm.flags.writeable = False
+        return lengths_mm
 
     # ---------------------------------------------------------------- the board's limits
 
@@ -112,17 +125,31 @@ class Planner:
         too_fast: TooFast = "raise",
     ) -> Planned:
         """From pulses straight to tendon lengths, in a time or at the fastest tendon's speed."""
-        limit = self.servos.max_speed_mm_s
         require_one(duration_s, speed_mm_s)
-        if duration_s is None:
+        if duration_s is not None:
+            duration_s = positive("duration_s", duration_s)
+        else:
             speed = self._config.motion.move_speed_mm_s if speed_mm_s is None else speed_mm_s
-            speed = positive("speed_mm_s", speed)
-            if speed > limit.min():
+            speed_mm_s = positive("speed_mm_s", speed)
+        lengths = tuple(lengths_mm.tolist())
+        return self._line(start_ticks, lengths, duration_s, speed_mm_s, too_fast)
+
+    def _line_anew(
+        self,
+        start_ticks: Ticks,
+        lengths_mm: tuple[float, ...],
+        duration_s: float | None,
+        speed_mm_s: float | None,
+        too_fast: TooFast,
+    ) -> Planned:
+        limit = self.servos.max_speed_mm_s
+        if speed_mm_s is not None:
+            if speed_mm_s > limit.min():
                 raise TrajectoryError(
-                    f"{speed:g} mm/s is faster than the servos' {limit.min():.0f} mm/s.",
+                    f"{speed_mm_s:g} mm/s is faster than the servos' {limit.min():.0f} mm/s.",
                     "Give a lower speed.",
                 )
-            limit = np.minimum(limit, speed)
+            limit = np.minimum(limit, speed_mm_s)
         if self.ticks(lengths_mm) == start_ticks:
             return Planned((), start_ticks, 0.0)
         motion = trajectory.line(

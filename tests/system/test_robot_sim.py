@@ -217,6 +217,9 @@ def test_bad_lengths_durations_and_speeds_are_refused(holding: Bench) -> None:
         robot.move_to(TARGET_MM, duration_s=-1)
     with pytest.raises(InputError):
         robot.move_to(TARGET_MM, speed_mm_s=math.nan)
+    # A move to where the robot is took any duration.
+    with pytest.raises(InputError, match="duration_s"):
+        robot.move_lengths(robot.lengths_mm, duration_s=math.nan)
     with pytest.raises(TrajectoryError):
         robot.move_to(TARGET_MM, duration_s=0.05)
     with pytest.raises(TrajectoryError):
