@@ -7,6 +7,7 @@ full length.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -245,6 +246,7 @@ def _newton(
     return length, along
 
 
+@lru_cache(maxsize=64)
 def _pieces(geometry: Geometry) -> tuple[BoolArray, FloatArray, BoolArray]:
     """Candidates for `_fit`.
 
@@ -287,7 +289,10 @@ def _pieces(geometry: Geometry) -> tuple[BoolArray, FloatArray, BoolArray]:
     )
     inner = np.concatenate([inner for inner, _ in candidates])
     basis = np.concatenate([basis for _, basis in candidates])
-    return inner, basis, np.asarray(basis[:, 1, 1] == 1.0)
+    free = np.asarray(basis[:, 1, 1] == 1.0)
+    for array in (inner, basis, free):
+        array.flags.writeable = False
+    return inner, basis, free
 
 
 MODEL: Final = TendonModel("paper", _lengths, _derivatives, _fit, _inner)
