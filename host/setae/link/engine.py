@@ -110,7 +110,7 @@ class Engine:
     @property
     def is_open(self) -> bool:
         """Whether commands go out."""
-        return self.phase is Phase.OPEN
+        return self._handshake.phase is Phase.OPEN
 
     @property
     def session(self) -> int:
@@ -153,7 +153,7 @@ class Engine:
         ]
         if self.is_open:
             times += [self._reliable.next_deadline_us, self._timing.ping_at_us]
-        return min((time for time in times if time is not None), default=None)
+        return min([time for time in times if time is not None], default=None)
 
     # ------------------------------------------------------------------ what users call
 

@@ -80,13 +80,11 @@ class Handshake:
 
     def next_deadline_us(self, heard_at_us: int) -> int | None:
         """When `poll` has something to do, or None."""
-        times = []
-        if self.phase in (Phase.ASKING, Phase.OPENING, Phase.SETTLING):
-            times.append(self._repeat_at_us)
         if self.in_session:
-            times.append(max(heard_at_us + _SILENCE_US, self._probe_at_us))
-            times.append(heard_at_us + _LOST_US)
-        return min(times) if times else None
+            silent_us = max(heard_at_us + _SILENCE_US, self._probe_at_us)
+            due_us = min(silent_us, heard_at_us + _LOST_US)
+            return due_us if self.phase is Phase.OPEN else min(due_us, self._repeat_at_us)
+        return self._repeat_at_us if self.phase in (Phase.ASKING, Phase.OPENING) else None
 
     def open(self, session: int, now_us: int) -> None:
         """Start."""

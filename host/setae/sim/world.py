@@ -89,6 +89,7 @@ class World:
         self._truth_fields = np.zeros((), dtype=np.dtype(CTruth))
         self._truth = CTruth.from_buffer(self._truth_fields.data)
         self._truth_holds = False
+        self._asked_now_us: int | None = None
         self._room = ctypes.create_string_buffer(_READ_ROOM)
         self._size = ctypes.c_size_t()
         for name, value in dict(parameters).items():
@@ -242,7 +243,10 @@ class World:
     @property
     def now_us(self) -> int:
         """Virtual time since power-on."""
-        return int(self._library.setae_world_now_us(self._live))
+        now_us = self._asked_now_us
+        if now_us is None:
+            now_us = self._asked_now_us = int(self._library.setae_world_now_us(self._live))
+        return now_us
 
     def send(self, data: bytes) -> None:
         """Put bytes on the line to the board now."""
@@ -386,6 +390,7 @@ class World:
             self._library.setae_world_destroy(self._handle)
             self._handle = None
             self._truth_holds = False
+            self._asked_now_us = None
 
     def __enter__(self) -> Self:
         return self
@@ -411,6 +416,7 @@ class World:
     def _change(self, status: int) -> None:
         """After each call that may have changed the world."""
         self._truth_holds = False
+        self._asked_now_us = None
         self._check(status)
 
     def _check(self, status: int) -> None:
