@@ -14,39 +14,46 @@ double length(const Modes& a) {
   return std::sqrt(inner(a, a));
 }
 
+// Column by column, each taken from all that follow: no sum waits for its last term.
 bool Cholesky::factor(const Matrix& matrix, int size, double shift) {
   size_ = size;
-  for (int m = 0; m < size; ++m) {
-    for (int k = 0; k <= m; ++k) {
-      double sum = matrix[m][k] + (m == k ? shift : 0);
-      for (int l = 0; l < k; ++l)
-        sum -= factor_[m][l] * factor_[k][l];
-      if (m > k) {
-        factor_[m][k] = sum / factor_[k][k];
-      } else if (sum > 1e-3) {
-        factor_[m][m] = std::sqrt(sum);
-      } else {
-        return false;
-      }
+  for (int k = 0; k < size; ++k) {
+    for (int m = k; m < size; ++m)
+      columns_[k][m] = matrix[m][k];
+    columns_[k][k] += shift;
+  }
+  for (int k = 0; k < size; ++k) {
+    Modes& column = columns_[k];
+    if (!(column[k] > 1e-3))
+      return false;
+    inverse_[k] = 1 / std::sqrt(column[k]);
+    for (int m = k + 1; m < size; ++m)
+      column[m] *= inverse_[k];
+    for (int l = k + 1; l < size; ++l) {
+      const double weight = column[l];
+      Modes& later = columns_[l];
+      for (int m = l; m < size; ++m)
+        later[m] -= weight * column[m];
     }
   }
   return true;
 }
 
 Modes Cholesky::solve(const Modes& right) const {
-  Modes out{};
-  for (int m = 0; m < size_; ++m) {
-    double sum = right[m];
-    for (int k = 0; k < m; ++k)
-      sum -= factor_[m][k] * out[k];
-    out[m] = sum / factor_[m][m];
+  Modes out = right;
+  for (int k = 0; k < size_; ++k) {
+    out[k] *= inverse_[k];
+    for (int m = k + 1; m < size_; ++m)
+      out[m] -= columns_[k][m] * out[k];
   }
-  for (int m = size_ - 1; m >= 0; --m) {
-    double sum = out[m];
-    for (int k = m + 1; k < size_; ++k)
-      sum -= factor_[k][m] * out[k];
-    out[m] = sum / factor_[m][m];
+  for (int k = size_ - 1; k >= 0; --k) {
+    double sum = out[k];
+    for (int m = k + 1; m < size_; ++m)
+      sum -= columns_[k][m] * out[m];
+    out[k] = sum * inverse_[k];
   }
+  for (int m = size_; m < kMaxModes; ++m)
+    out[m] = 0;
   return out;
 }
 

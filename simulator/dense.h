@@ -20,7 +20,8 @@ class Cholesky {
 
  private:
   int size_ = 0;
-  Matrix factor_{};
+  Matrix columns_;  // of the lower factor: columns_[k][m] below the diagonal at m > k
+  Modes inverse_;   // of the diagonal
 };
 
 }  // namespace sim

@@ -12,6 +12,7 @@ constexpr double kLongestStep = 4;    // root of N mm; half the spring's whole c
 constexpr double kSecantStep = 1e-4;  // root of N mm
 constexpr double kCreep = 1e-4;       // root of N mm a step
 constexpr double kLargestShift = 1e6;
+constexpr int kGuesses = 4;            // of which tendons are taut
 constexpr double kNudge = 1e-3;        // root of N mm; moves the tip by 0.02 mm or so
 constexpr double kSolidPenalty = 100;  // times the spring's axial stiffness
 
@@ -60,7 +61,10 @@ void Plant::place(const PerTendon& lengths_mm, const Aside& aside) {
   slide_ = {};
   friction_load_ = {};
   friction_column_ = {};
-  evaluate(anchor_, state_);
+  friction_loss_ = {};
+  rubs_ = {};
+  was_taut_ = {};
+  evaluate(anchor_, state());
 }
 
 void Plant::settle(const PerTendon& lengths_mm) {
@@ -71,17 +75,18 @@ void Plant::settle(const PerTendon& lengths_mm) {
 
 void Plant::step(const PerTendon& lengths_mm, double duration_s) {
   lengths_mm_ = lengths_mm;
-  anchor_ = state_.modes;
+  anchor_ = state().modes;
   damping_ = settings_.damping_time_s / duration_s;
   may_slide_ = settings_.friction > 0;
   slide_from_ = slide_;
+  was_taut_ = taut();
+  reload(state());
   for (int i = 0; i < settings_.tendons; ++i)
-    path_from_mm_[i] = state_.paths[i].length_mm();
-  evaluate(anchor_, state_);
+    path_from_mm_[i] = state().paths[i].length_mm();
   solve();
   double moved = 0;
   for (int m = 0; m < rod_.modes(); ++m) {
-    moved = std::max(moved, std::fabs(state_.modes[m] - anchor_[m]));
+    moved = std::max(moved, std::fabs(state().modes[m] - anchor_[m]));
   }
   creeping_ = moved > kCreep || leave_saddle();
 }
@@ -99,7 +104,7 @@ bool Plant::leave_saddle() {
     stable = falls_nowhere(solver);
   }
   if (!stable) {
-    for (double shift = 0.25; !solver.factor(hessian(state_), rod_.modes(), shift); shift *= 2) {
+    for (double shift = 0.25; !solver.factor(hessian(taut()), rod_.modes(), shift); shift *= 2) {
       if (!(shift < kLargestShift))
         break;
     }
@@ -111,17 +116,17 @@ bool Plant::leave_saddle() {
       for (double& part : way)
         part /= size;
     }
-    Modes modes = state_.modes;
+    Modes modes = state().modes;
     for (int m = 0; m < rod_.modes(); ++m)
       modes[m] += kNudge * way[m];
-    evaluate(modes, state_);
+    evaluate(modes, state());
   }
   damping_ = damping;
   return !stable;
 }
 
 bool Plant::falls_nowhere(Cholesky& solver) const {
-  return solver.factor(hessian(state_), rod_.modes(), 0);
+  return solver.factor(hessian(taut()), rod_.modes(), 0);
 }
 
 bool Plant::stable() {
@@ -143,9 +148,9 @@ void Plant::solve() {
     rebuild_secant();
     fresh = true;
   }
-  settle_friction(state_);
+  settle_friction(state());
   for (iterations_ = 0; iterations_ < kIterations; ++iterations_) {
-    residual_ = length(state_.gradient);
+    residual_ = length(state().gradient);
     if (residual_ < kTolerance)
       return;
     if (since_rebuild >= kPatience) {
@@ -155,25 +160,25 @@ void Plant::solve() {
     }
     Modes step;
     const bool descends = newton_step(step);
-    const double slope = inner(state_.gradient, step);
+    const double slope = inner(state().gradient, step);
     double fraction = std::min(1.0, kLongestStep / length(step));
     bool accepted = false;
     for (int halving = 0; descends && halving < 25; ++halving) {
-      Modes modes = state_.modes;
+      Modes modes = state().modes;
       for (int m = 0; m < rod_.modes(); ++m)
         modes[m] += fraction * step[m];
-      trial_.paths = state_.paths;
-      evaluate(modes, trial_);
-      if (trial_.energy <= state_.energy + 1e-4 * fraction * slope + 1e-11) {
+      evaluate_beside(modes);
+      if (trial().energy <= state().energy + 1e-4 * fraction * slope + 1e-11) {
         accepted = true;
         break;
       }
       fraction *= 0.5;
     }
     if (accepted) {
-      update_secant(state_, trial_);
-      std::swap(state_, trial_);
-      settle_friction(state_);
+      update_secant(state(), trial());
+      present_ = 1 - present_;
+      was_taut_ = {};
+      settle_friction(state());
       ++since_rebuild;
       fresh = false;
     } else {
@@ -184,29 +189,64 @@ void Plant::solve() {
       since_rebuild = 0;
     }
   }
-  residual_ = length(state_.gradient);
+  residual_ = length(state().gradient);
 }
 
-Matrix Plant::hessian(const State& state) const {
+// At modes near the present state's.
+void Plant::evaluate_beside(const Modes& modes) {
+  for (int i = 0; i < settings_.tendons; ++i)
+    trial().paths[i].start_from(state().paths[i]);
+  evaluate(modes, trial());
+}
+
+Tendons Plant::taut() const {
+  Tendons taut{};
+  for (int i = 0; i < settings_.tendons; ++i)
+    taut[i] = state().tension_n[i] > 0;
+  return taut;
+}
+
+// The lower half, as if these tendons were the taut ones.
+Matrix Plant::hessian(const Tendons& taut) const {
   Matrix hessian = secant_;
   for (int m = 0; m < rod_.modes(); ++m)
     hessian[m][m] += 1 + damping_;
   for (int i = 0; i < settings_.tendons; ++i) {
-    if (state.tension_n[i] <= 0)
+    if (!taut[i])
       continue;
+    const Modes& gradient = state().path_gradient[i];
     for (int m = 0; m < rod_.modes(); ++m) {
-      const double weight = settings_.tendon_stiffness_n_per_mm * state.path_gradient[i][m];
+      const double weight = settings_.tendon_stiffness_n_per_mm * gradient[m];
       for (int k = 0; k <= m; ++k)
-        hessian[m][k] += weight * state.path_gradient[i][k];
+        hessian[m][k] += weight * gradient[k];
     }
   }
-  add_solid_hessian(state, hessian);
+  add_solid_hessian(hessian);
   return hessian;
 }
 
-// Step from the modified Newton system; false if it can't be made to descend.
+// Step from the modified Newton system; false if it can't be made to descend. Which
+// tendons are taut at its end is part of what is sought: starting from those that are now
+// it would go far where all have just been let out, and back by halves.
 bool Plant::newton_step(Modes& step) const {
-  const Matrix matrix = hessian(state_);
+  Tendons guess = taut();
+  for (int i = 0; i < settings_.tendons; ++i)
+    guess[i] = guess[i] || (was_taut_[i] && state().path_known[i]);
+  for (int attempt = 0; attempt < kGuesses && newton_step(guess, step); ++attempt) {
+    Tendons found{};
+    for (int i = 0; i < settings_.tendons; ++i) {
+      found[i] = state().path_known[i] &&
+                 state().stretch_mm[i] + inner(state().path_gradient[i], step) > 0;
+    }
+    if (found == guess)
+      return true;
+    guess = found;
+  }
+  return newton_step(taut(), step);
+}
+
+bool Plant::newton_step(const Tendons& taut, Modes& step) const {
+  const Matrix matrix = hessian(taut);
   Cholesky solver;
   double shift = 0;
   for (int attempt = 0; !solver.factor(matrix, rod_.modes(), shift); ++attempt) {
@@ -216,31 +256,37 @@ bool Plant::newton_step(Modes& step) const {
   }
   Modes downhill{};
   for (int m = 0; m < rod_.modes(); ++m)
-    downhill[m] = -state_.gradient[m];
+    downhill[m] = -state().gradient[m];
+  for (int i = 0; i < settings_.tendons; ++i) {
+    if (!taut[i] || state().tension_n[i] > 0)
+      continue;
+    const double pull_n = settings_.tendon_stiffness_n_per_mm * state().stretch_mm[i];
+    for (int m = 0; m < rod_.modes(); ++m)
+      downhill[m] -= pull_n * (state().path_gradient[i][m] + friction_loss_[i][m]);
+  }
   step = solver.solve(downhill);
   const Modes plain = step;
   // Friction's part is not symmetric: one rank for each tendon, by Sherman and Morrison.
   std::array<Modes, kTendonsMost> solved;
   for (int i = 0; i < settings_.tendons; ++i) {
-    if (state_.tension_n[i] <= 0 || inner(friction_column_[i], friction_column_[i]) == 0) {
-      solved[i] = {};
+    solved[i] = {};
+    if (!taut[i] || !rubs_[i])
       continue;
-    }
     solved[i] = solver.solve(friction_column_[i]);
     for (int j = 0; j < i; ++j)
-      deflate(solved[j], state_.path_gradient[j], solved[i]);
-    const double scale = 1 + inner(state_.path_gradient[i], solved[i]);
+      deflate(solved[j], state().path_gradient[j], solved[i]);
+    const double scale = 1 + inner(state().path_gradient[i], solved[i]);
     if (scale < 0.1) {  // no longer a small change of what is symmetric
       solved[i] = {};
       continue;
     }
     for (int m = 0; m < rod_.modes(); ++m)
       solved[i][m] /= scale;
-    deflate(solved[i], state_.path_gradient[i], step);
+    deflate(solved[i], state().path_gradient[i], step);
   }
-  if (inner(step, state_.gradient) >= 0)
+  if (inner(step, state().gradient) >= 0)
     step = plain;
-  return inner(step, state_.gradient) < 0;
+  return inner(step, state().gradient) < 0;
 }
 
 // The gradient of tendons and weight with the tensions held at other values.
@@ -251,7 +297,7 @@ Modes Plant::frozen_gradient(const State& state, const PerTendon& tension_n) con
     if (extra == 0)
       continue;
     Modes gradient{};
-    if (state.tension_n[i] > 0) {
+    if (state.path_known[i]) {
       gradient = state.path_gradient[i];
     } else {
       rod_.pull_back(state.shape, state.paths[i].wrenches(), gradient);
@@ -263,15 +309,14 @@ Modes Plant::frozen_gradient(const State& state, const PerTendon& tension_n) con
 }
 
 void Plant::rebuild_secant() {
-  const PerTendon tension_n = state_.tension_n;
+  const PerTendon tension_n = state().tension_n;
   for (int k = 0; k < rod_.modes(); ++k) {
-    Modes modes = state_.modes;
+    Modes modes = state().modes;
     modes[k] += kSecantStep;
-    trial_.paths = state_.paths;
-    evaluate(modes, trial_);
-    const Modes moved = frozen_gradient(trial_, tension_n);
+    evaluate_beside(modes);
+    const Modes moved = frozen_gradient(trial(), tension_n);
     for (int m = 0; m < rod_.modes(); ++m) {
-      secant_[m][k] = (moved[m] - state_.geometric[m]) / kSecantStep;
+      secant_[m][k] = (moved[m] - state().geometric[m]) / kSecantStep;
     }
   }
   for (int m = 0; m < rod_.modes(); ++m) {
@@ -295,8 +340,9 @@ void Plant::update_secant(const State& from, const State& to) {
   if (std::fabs(along) < 1e-3 * length(rest) * length(step))
     return;
   for (int m = 0; m < rod_.modes(); ++m) {
+    const double weight = rest[m] / along;
     for (int k = 0; k < rod_.modes(); ++k)
-      secant_[m][k] += rest[m] * rest[k] / along;
+      secant_[m][k] += weight * rest[k];
   }
 }
 

@@ -13,6 +13,7 @@ namespace sim {
 
 constexpr int kTendonsMost = 8;
 using PerTendon = std::array<double, kTendonsMost>;  // what is beyond their number is 0
+using Tendons = std::array<bool, kTendonsMost>;      // some of them
 
 struct PlantSettings {
   double free_length_mm;
@@ -54,10 +55,10 @@ class Plant {
   void step(const PerTendon& lengths_mm, double duration_s);
 
   const PerTendon& lengths_mm() const { return lengths_mm_; }
-  const Shape& shape() const { return state_.shape; }
+  const Shape& shape() const { return state().shape; }
   const Rod& rod() const { return rod_; }
-  const PerTendon& tension_n() const { return state_.tension_n; }
-  const std::array<TendonPath, kTendonsMost>& paths() const { return state_.paths; }
+  const PerTendon& tension_n() const { return state().tension_n; }
+  const std::array<TendonPath, kTendonsMost>& paths() const { return state().paths; }
 
   // Scaled gradient norm that the last solution left; below kTolerance it counts
   // as solved.
@@ -69,7 +70,7 @@ class Plant {
   bool creeping() const { return creeping_; }
   // Whether the energy rises in every direction from here. Asks anew, so it takes long.
   bool stable();
-  double energy_n_mm() const { return state_.energy; }
+  double energy_n_mm() const { return state().energy; }
   long evaluations() const { return evaluations_; }
 
   // Root of N mm: moves the tip by less than 0.01 mm.
@@ -77,13 +78,19 @@ class Plant {
 
  private:
   struct State {
+    // Of the shape alone:
     Modes modes;
-    double energy;
-    Modes gradient;   // friction's load included
-    Modes geometric;  // the part of the gradient that needs a secant
     Shape shape;
     std::array<TendonPath, kTendonsMost> paths;
     std::array<Modes, kTendonsMost> path_gradient;
+    Tendons path_known;  // and its gradient: not of the slackest
+    double weight_energy;
+    Modes weight_gradient;
+    // Under the tendons' present lengths, damping and friction:
+    double energy;
+    Modes gradient;   // friction's load included
+    Modes geometric;  // the part of the gradient that needs a secant
+    PerTendon stretch_mm;
     PerTendon tension_n;
   };
 
@@ -94,7 +101,16 @@ class Plant {
     Strain slope;  // of the gap
   };
 
+  State& state() { return states_[present_]; }
+  const State& state() const { return states_[present_]; }
+  State& trial() { return states_[1 - present_]; }
+
   void evaluate(const Modes& modes, State& state);
+  void evaluate_beside(const Modes& modes);
+  void reload(State& state);
+  void find_path(int i, State& state) const;
+  void load(State& state) const;
+  Tendons taut() const;
   void solve();
   bool leave_saddle();
   void settle_friction(State& state);
@@ -102,12 +118,13 @@ class Plant {
   void add_weight(State& state) const;
   bool solid_contact(const Strain& strain, SolidContact& contact) const;
   void add_solid(State& state) const;
-  void add_solid_hessian(const State& state, Matrix& hessian) const;
+  void add_solid_hessian(Matrix& hessian) const;
   Modes frozen_gradient(const State& state, const PerTendon& tension_n) const;
   void rebuild_secant();
   void update_secant(const State& from, const State& to);
-  Matrix hessian(const State& state) const;
+  Matrix hessian(const Tendons& taut) const;
   bool newton_step(Modes& step) const;
+  bool newton_step(const Tendons& taut, Modes& step) const;
 
   PlantSettings settings_;
   Rod rod_;
@@ -124,8 +141,11 @@ class Plant {
   bool may_slide_ = false;
   Modes friction_load_{};
   std::array<Modes, kTendonsMost> friction_column_{};
-  State state_{};
-  State trial_{};
+  std::array<Modes, kTendonsMost> friction_loss_{};  // of a tension of 1: its load
+  Tendons rubs_{};                                   // those that the two are for
+  Tendons was_taut_{};             // at the last step's end; empty where that is over
+  std::array<State, 2> states_{};  // where it is, and where it tries to go
+  int present_ = 0;
   Matrix secant_{};  // geometric stiffness, learnt from step to step
   bool secant_known_ = false;
   double residual_ = 0;

@@ -18,29 +18,56 @@ void Plant::evaluate(const Modes& modes, State& state) {
   ++evaluations_;
   state.modes = modes;
   rod_.shape(modes, state.shape);
-  state.energy = 0.5 * inner(modes, modes) + inner(friction_load_, modes);
-  state.gradient = modes;
+  state.path_known = {};
+  for (int i = 0; i < settings_.tendons; ++i)
+    find_path(i, state);
+  add_weight(state);
+  load(state);
+}
+
+// The shortest path, and the slope of its length; where it is slack by far, only a bound.
+void Plant::find_path(int i, State& state) const {
+  const double slack_mm = lengths_mm_[i] - kSlack_mm;
+  TendonPath& path = state.paths[i];
+  path.solve(state.shape, settings_.base_hole_mm[i], settings_.top_hole_mm[i],
+             settings_.bore_radius_mm, slack_mm);
+  if (path.length_mm() < slack_mm)
+    return;
+  state.path_known[i] = true;
+  state.path_gradient[i] = Modes{};
+  rod_.pull_back(state.shape, path.wrenches(), state.path_gradient[i]);
+}
+
+// The same shape under other lengths: only a path that was slack by far may be missing.
+void Plant::reload(State& state) {
+  for (int i = 0; i < settings_.tendons; ++i) {
+    if (!state.path_known[i] && state.paths[i].length_mm() >= lengths_mm_[i] - kSlack_mm)
+      find_path(i, state);
+  }
+  load(state);
+}
+
+// Energy and gradient of a known shape and its paths.
+void Plant::load(State& state) const {
+  state.energy = 0.5 * inner(state.modes, state.modes) + inner(friction_load_, state.modes) +
+                 state.weight_energy;
+  state.gradient = state.modes;
   for (int m = 0; m < rod_.modes(); ++m) {
-    const double away = modes[m] - anchor_[m];
+    const double away = state.modes[m] - anchor_[m];
     state.energy += 0.5 * damping_ * away * away;
     state.gradient[m] += damping_ * away + friction_load_[m];
   }
-  state.geometric = Modes{};
+  state.geometric = state.weight_gradient;
   for (int i = 0; i < settings_.tendons; ++i) {
-    state.paths[i].solve(state.shape, settings_.base_hole_mm[i], settings_.top_hole_mm[i],
-                         settings_.bore_radius_mm, lengths_mm_[i] - kSlack_mm);
-    const double stretch = state.paths[i].length_mm() - lengths_mm_[i];
-    state.tension_n[i] = stretch > 0 ? settings_.tendon_stiffness_n_per_mm * stretch : 0;
-    if (stretch <= 0)
+    const double stretch_mm = state.paths[i].length_mm() - lengths_mm_[i];
+    state.stretch_mm[i] = stretch_mm;
+    state.tension_n[i] = stretch_mm > 0 ? settings_.tendon_stiffness_n_per_mm * stretch_mm : 0;
+    if (stretch_mm <= 0)
       continue;
-    state.energy += 0.5 * state.tension_n[i] * stretch;
-    state.path_gradient[i] = Modes{};
-    rod_.pull_back(state.shape, state.paths[i].wrenches(), state.path_gradient[i]);
-    for (int m = 0; m < rod_.modes(); ++m) {
+    state.energy += 0.5 * state.tension_n[i] * stretch_mm;
+    for (int m = 0; m < rod_.modes(); ++m)
       state.geometric[m] += state.tension_n[i] * state.path_gradient[i][m];
-    }
   }
-  add_weight(state);
   for (int m = 0; m < rod_.modes(); ++m)
     state.gradient[m] += state.geometric[m];
   add_solid(state);
@@ -50,22 +77,24 @@ void Plant::evaluate(const Modes& modes, State& state) {
 void Plant::add_weight(State& state) const {
   const int top = rod_.elements();
   Wrenches wrenches;
+  state.weight_energy = 0;
+  state.weight_gradient = Modes{};
   for (int j = 0; j <= top; ++j) {
     const bool end = j == 0 || j == top;
     double mass_g = settings_.spring_mass_g / top * (end ? 0.5 : 1.0);
     if (j == top)
       mass_g += settings_.tip_mass_g;
     const Vec3 weight_n = (1e-3 * mass_g) * settings_.gravity_m_s2;
-    state.energy -= dot(weight_n, state.shape.position[j]);
+    state.weight_energy -= dot(weight_n, state.shape.position[j]);
     wrenches[j] = {{0, 0, 0}, into(state.shape.rotation[j], -weight_n)};
   }
   const Mat3& axes = state.shape.rotation[top];
   const Vec3 at = state.shape.position[top] + settings_.load_offset_mm * axes.ez;
   const Vec3 load_n = into(axes, -settings_.load_n);
-  state.energy -= dot(settings_.load_n, at);
+  state.weight_energy -= dot(settings_.load_n, at);
   wrenches[top].force = wrenches[top].force + load_n;
   wrenches[top].moment = wrenches[top].moment + cross({0, 0, settings_.load_offset_mm}, load_n);
-  rod_.pull_back(state.shape, wrenches, state.geometric);
+  rod_.pull_back(state.shape, wrenches, state.weight_gradient);
 }
 
 // Coils that touch at the bend's inner side: a stiff one-sided spring. The edge
@@ -94,11 +123,11 @@ void Plant::add_solid(State& state) const {
   }
 }
 
-void Plant::add_solid_hessian(const State& state, Matrix& hessian) const {
+void Plant::add_solid_hessian(Matrix& hessian) const {
   const double stiffness = solid_penalty_ * rod_.element_mm();
   SolidContact contact;
   for (int e = 0; e < rod_.elements(); ++e) {
-    if (!solid_contact(state.shape.strain[e], contact))
+    if (!solid_contact(state().shape.strain[e], contact))
       continue;
     Modes slope{}, by_x{}, by_y{};
     rod_.pull_back_strain(e, contact.slope, slope);
@@ -108,7 +137,7 @@ void Plant::add_solid_hessian(const State& state, Matrix& hessian) const {
         -stiffness * contact.gap * 0.5 * settings_.outer_diameter_mm / contact.bend_per_mm;
     for (int m = 0; m < rod_.modes(); ++m) {
       const double along_m = contact.x * by_x[m] + contact.y * by_y[m];
-      for (int k = 0; k < rod_.modes(); ++k) {
+      for (int k = 0; k <= m; ++k) {
         const double along_k = contact.x * by_x[k] + contact.y * by_y[k];
         hessian[m][k] += stiffness * slope[m] * slope[k] +
                          round * (by_x[m] * by_x[k] + by_y[m] * by_y[k] - along_m * along_k);
@@ -127,10 +156,13 @@ void Plant::settle_friction(State& state) {
     const double slid_mm = path_from_mm_[i] - state.paths[i].length_mm();
     const double pushed = slide_from_[i] + slid_mm / settings_.presliding_mm;
     slide_[i] = std::min(std::max(pushed, -1.0), 1.0);
-    friction_column_[i] = {};
     const double tension_n = state.tension_n[i];
-    if (tension_n <= 0 || !state.paths[i].touches_bore())
+    const bool pulls = tension_n > 0 || (was_taut_[i] && state.path_known[i]);
+    rubs_[i] = pulls && state.paths[i].touches_bore();
+    if (!rubs_[i]) {
+      friction_loss_[i] = friction_column_[i] = {};
       continue;
+    }
     Wrenches wrenches, by_decay;
     state.paths[i].wrenches(state.shape, settings_.friction * slide_[i], wrenches, by_decay);
     Modes pull{}, by_slide{};
@@ -142,6 +174,7 @@ void Plant::settle_friction(State& state) {
     for (int m = 0; m < rod_.modes(); ++m) {
       const double lost = pull[m] - state.path_gradient[i][m];
       load[m] += tension_n * lost;
+      friction_loss_[i][m] = lost;
       friction_column_[i][m] = settings_.tendon_stiffness_n_per_mm * lost - by_path * by_slide[m];
     }
   }

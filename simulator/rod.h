@@ -22,6 +22,7 @@ constexpr int kMaxStations = kMaxElements + 1;
 constexpr int kComponents = 6;
 constexpr int kPlainModes = 21;
 constexpr int kMaxModes = kPlainModes + kComponents;
+constexpr int kMaxOrders = 5;  // of a component's
 
 // Amplitudes scaled so that the elastic energy is half their sum of squares
 // (unit: root of N mm). This makes the plant's Hessian well conditioned.
@@ -49,6 +50,12 @@ struct Wrench {
   Vec3 force;
 };
 
+// Of an element's exponential: what its derivative needs.
+struct Turning {
+  double b, c;              // (1 - cos)/angle^2 and (angle - sin)/angle^3
+  double b_along, c_along;  // their derivatives along the element's stretch
+};
+
 struct Shape {
   int elements;
   std::array<Vec3, kMaxStations> position;
@@ -56,6 +63,7 @@ struct Shape {
   std::array<Strain, kMaxElements> strain;
   std::array<Vec3, kMaxElements> step_position;  // element's end in its start's frame
   std::array<Mat3, kMaxElements> step_rotation;
+  std::array<Turning, kMaxElements> turning;
 };
 
 // Away from straight: bent about x and y, and sheared along them.
@@ -91,6 +99,10 @@ class Rod {
   Modes compressed(double length_mm, const Aside& aside) const;
 
  private:
+  using Grid = double[kMaxOrders][kComponents];
+  void add_strain(int element, const Strain& derivative, Grid& sum) const;
+  void add_grid(const Grid& sum, Modes& gradient) const;
+
   struct Mode {
     int component;
     int order;
@@ -103,7 +115,9 @@ class Rod {
   double cosine_, sine_;  // of the stiffer axis
   double weight_0_ = 1;   // stiffness of the first element, relative to the middle
   Mode table_[kMaxModes];
-  double basis_[kMaxElements][kMaxModes];
+  // By element, order and component, zero where there is no such mode: loops over these
+  // have no end to look up.
+  double basis_[kMaxElements][kMaxOrders][kComponents];
 };
 
 }  // namespace sim

@@ -24,6 +24,11 @@ double radius_of(double u, double v) {
 
 }  // namespace
 
+void TendonPath::start_from(const TendonPath& other) {
+  crossing_ = other.crossing_;
+  touches_ = other.touches_;
+}
+
 void TendonPath::solve(const Shape& shape, const Vec3& base, const Vec3& top, double bore_radius_mm,
                        double slack_mm) {
   const int last_station = shape.elements;
@@ -80,10 +85,8 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm, double slack_mm
   const int inner = shape.elements - 1;
   std::array<Vec3, kMaxElements>& direction = direction_;
   std::array<double, kMaxElements> piece;
-  std::array<Crossing, kMaxStations> step{};
-  std::array<Crossing, kMaxStations> base = crossing_;
-  std::array<Crossing, kMaxStations> gradient{};
-  std::array<Block, kMaxStations> diagonal{}, upper{};
+  std::array<Crossing, kMaxStations> base, gradient, right, step;
+  std::array<Block, kMaxStations> diagonal, upper;
   double base_length = 0, slope = 0, fraction = 1;
   bool have_step = false;
 
@@ -154,7 +157,7 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm, double slack_mm
     }
 
     // Block Thomas.
-    std::array<Crossing, kMaxStations> right = gradient;
+    right[1] = gradient[1];
     for (int j = 2; j <= inner; ++j) {
       const Block& d = diagonal[j - 1];
       const Block& o = upper[j - 1];
@@ -167,8 +170,7 @@ void TendonPath::bend(const Shape& shape, double bore_radius_mm, double slack_mm
       diagonal[j].b -= o.a * x.b + o.c * x.d;
       diagonal[j].c -= o.b * x.a + o.d * x.c;
       diagonal[j].d -= o.b * x.b + o.d * x.d;
-      right[j].u -= o.a * yu + o.c * yv;
-      right[j].v -= o.b * yu + o.d * yv;
+      right[j] = {gradient[j].u - (o.a * yu + o.c * yv), gradient[j].v - (o.b * yu + o.d * yv)};
     }
     double longest = 0;
     slope = 0;

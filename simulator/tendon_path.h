@@ -17,6 +17,9 @@ class TendonPath {
   void solve(const Shape& shape, const Vec3& base, const Vec3& top, double bore_radius_mm,
              double slack_mm);
 
+  // Takes another's path as the start of the next call's.
+  void start_from(const TendonPath& other);
+
   // Length, a soft bore's small energy included: exactly the function whose
   // gradient wrenches() holds.
   double length_mm() const { return length_mm_; }
