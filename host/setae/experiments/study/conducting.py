@@ -7,12 +7,13 @@ is there belongs to a run that is whole. So an interrupted study goes on where i
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from multiprocessing import resource_tracker
+from multiprocessing import forkserver, resource_tracker
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final, TypeAlias
@@ -30,9 +31,13 @@ Row: TypeAlias = Mapping[str, Any]
 RUNS: Final = "runs"
 _ROW: Final = "row.json"
 _CONNECT_S: Final = 10
-# Of workers on this machine: a sampling profiler that nobody reads, and looks at the loop and the
-# memory many times a second, would take some of the cores from runs of many seconds.
-_FEW_LOOKS: Final = {
+# Workers on this machine come out of one process that imports all this once, while this one still
+# imports its own; each for itself would take longer to begin than a scan takes.
+_NEEDED: Final = ("distributed", "setae.experiments.study", "scipy.spatial", "threadpoolctl")
+# A sampling profiler that nobody reads, and looks at the loop and the memory many times a second,
+# would take some of the cores from the runs.
+_OF_WORKERS: Final = {
+    "distributed.worker.multiprocessing-method": "forkserver",
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "2s",
@@ -157,11 +162,13 @@ def _outcomes(
 def _distributed(
     runs: Sequence[Run], workers: int, scheduler: str | None, task: Callable[[Run], Outcome]
 ) -> Iterator[tuple[Run, Outcome]]:
+    if scheduler is None:
+        _prepare_workers()
     distributed = extras.load("distributed", "study", "More than one worker")
     dask_config = extras.load("dask.config", "study", "More than one worker")
     with ExitStack() as stack:
         if scheduler is None:
-            stack.enter_context(dask_config.set(_FEW_LOOKS))
+            stack.enter_context(dask_config.set(_OF_WORKERS))
             # Only this machine can reach it, it has no pages, and any free ports will do: studies
             # run beside each other.
             with _interrupts_held_back():
@@ -194,6 +201,13 @@ def _distributed(
             run = of[future.key]
             lost = future.exception()
             yield run, future.result() if lost is None else _lost(run, lost)
+
+
+def _prepare_workers() -> None:
+    """Begin the process that workers come out of; it ends with this one."""
+    with _interrupts_held_back():
+        multiprocessing.set_forkserver_preload(list(_NEEDED))
+        forkserver.ensure_running()
 
 
 @contextmanager
