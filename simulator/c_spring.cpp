@@ -28,6 +28,7 @@ namespace {
 
 constexpr double kStepS = 0.02;
 constexpr int kStepsMost = 3000;
+constexpr int kUnsolvedMost = 200;  // in a row
 
 }  // namespace
 
@@ -78,10 +79,12 @@ SETAE_EXPORT int setae_spring_rest(setae_spring* spring, const double* length_mm
   try {
     Plant& plant = spring->plant;
     plant.place(lengths_mm, {bend_rad[0], bend_rad[1], shift_mm[0], shift_mm[1]});
-    int steps = 0;
+    int steps = 0, unsolved = 0;
     do {
       plant.step(lengths_mm, kStepS);
-    } while ((plant.creeping() || !plant.solved()) && ++steps < kStepsMost);
+      unsolved = plant.solved() ? 0 : unsolved + 1;
+    } while ((plant.creeping() || !plant.solved()) && unsolved < kUnsolvedMost &&
+             ++steps < kStepsMost);
     const Shape& shape = plant.shape();
     *out = {};
     write(shape.position[shape.elements], out->position_mm);
@@ -89,7 +92,7 @@ SETAE_EXPORT int setae_spring_rest(setae_spring* spring, const double* length_mm
     for (int i = 0; i < spring->tendons; ++i)
       out->tension_n[i] = plant.tension_n()[i];
     out->energy_n_mm = plant.energy_n_mm();
-    out->stable = steps < kStepsMost && plant.stable();
+    out->stable = plant.solved() && steps < kStepsMost && plant.stable();
     out->residual = plant.residual();
   } catch (const std::exception&) {
     return kInternal;

@@ -1,5 +1,6 @@
 // The C interface to what only a simulator knows.
 #include <cstring>
+#include <limits>
 
 #include "c_world.h"
 
@@ -74,7 +75,14 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
     write(truth.contact.point_mm, out->contact_point_mm);
     write(truth.bent_tip_mm, out->bent_tip_mm);
     out->pressure_hpa = w.pressure_hpa();
-    out->plant_residual = w.foreign() ? 0 : plant.residual();
+    if (w.foreign()) {
+      out->plant_residual = out->largest_residual = std::numeric_limits<double>::quiet_NaN();
+    } else {
+      out->plant_residual = plant.residual();
+      out->largest_residual = w.largest_residual();
+      out->unsolved_samples = w.unsolved_samples();
+      out->plant_iterations = plant.iterations();
+    }
     return 0;
   });
 }

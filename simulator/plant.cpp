@@ -41,6 +41,7 @@ void deflate(const Modes& column, const Modes& row, Modes& solution) {
 }  // namespace
 
 constexpr double Plant::kTolerance;
+constexpr double Plant::kNone;
 
 Plant::Plant(const PlantSettings& settings)
     : settings_(settings),
@@ -105,8 +106,10 @@ bool Plant::leave_saddle() {
   }
   if (!stable) {
     for (double shift = 0.25; !solver.factor(hessian(taut()), rod_.modes(), shift); shift *= 2) {
-      if (!(shift < kLargestShift))
-        break;
+      if (!(shift < kLargestShift)) {  // there is no telling which way it falls
+        damping_ = damping;
+        return false;
+      }
     }
     Modes way;
     way.fill(1);  // inverse iteration: towards the lowest curvature

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
 #include "dense.h"
 #include "rod.h"
@@ -61,8 +62,8 @@ class Plant {
   const std::array<TendonPath, kTendonsMost>& paths() const { return state().paths; }
 
   // Scaled gradient norm that the last solution left; below kTolerance it counts
-  // as solved.
-  double residual() const { return residual_; }
+  // as solved. Never NaN.
+  double residual() const { return std::isfinite(residual_) ? residual_ : kNone; }
   bool solved() const { return residual_ < kTolerance; }
   // Newton's steps that the last solution took.
   int iterations() const { return iterations_; }
@@ -75,6 +76,7 @@ class Plant {
 
   // Root of N mm: moves the tip by less than 0.01 mm.
   static constexpr double kTolerance = 1e-4;
+  static constexpr double kNone = 1e300;  // of what is no number any more
 
  private:
   struct State {

@@ -37,7 +37,11 @@ typedef struct {
   double contact_point_mm[3]; /* where, in the world; valid if contact_depth_mm > 0 */
   double bent_tip_mm[3];      /* the filament's tip at the sensor's last sample, in the world */
   double pressure_hpa;        /* true pressure at the sensor, noise included */
-  double plant_residual;      /* scaled gradient norm of the last equilibrium */
+  /* Scaled gradient norm of this equilibrium; below 1e-4 it is solved. NaN: of another plant. */
+  double plant_residual;
+  double largest_residual;  /* of all samples since the start */
+  int64_t unsolved_samples; /* how many of them have no solution */
+  int64_t plant_iterations; /* Newton's steps to this equilibrium */
 } setae_truth;
 
 /* A world with every parameter at its default; nothing runs yet. */

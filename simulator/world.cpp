@@ -8,7 +8,7 @@ namespace sim {
 namespace {
 
 // Samples in a row without a solution that end a run. One alone can be a snap
-// from one equilibrium to another.
+// from one equilibrium to another; all are counted.
 constexpr int kUnsolvedMost = 10;
 constexpr uint64_t kSlipStream = 16;  // of random numbers; the bristle has those before
 
@@ -206,7 +206,7 @@ bool World::sample() {
   const int64_t duration_us = now_us_ - last_sample_us_;
   move(body_, duration_us);
   ask_foreign();
-  unsolved_ = outcome() == Outcome::kFine ? 0 : unsolved_ + 1;
+  count_unsolved();
   const Top now = top(body_);
   bristle_.step(1e-6 * static_cast<double>(duration_us), in_world(root_mm(now)),
                 in_world(now.rotation), environment_);
@@ -218,6 +218,15 @@ bool World::sample() {
     return false;
   push_sample();
   return true;
+}
+
+void World::count_unsolved() {
+  const bool fine = outcome() == Outcome::kFine;
+  unsolved_ = fine ? 0 : unsolved_ + 1;
+  if (foreign_)
+    return;
+  unsolved_samples_ += fine ? 0 : 1;
+  largest_residual_ = std::max(largest_residual_, body_.plant.residual());
 }
 
 void World::push_sample() {

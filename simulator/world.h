@@ -88,6 +88,9 @@ class World {
   bool foreign() const { return static_cast<bool>(foreign_); }
   // Of the first equilibrium, right after it was made.
   Outcome outcome() const;
+  // Of the spring at all samples so far: how near its worst is to a solution, how many have none.
+  double largest_residual() const { return largest_residual_; }
+  int64_t unsolved_samples() const { return unsolved_samples_; }
 
   void set_sensor_fault(SensorFault fault) { sensor_fault_ = fault; }
   void set_supply_mv(uint16_t supply_mv) { hal_.set_supply_mv(supply_mv); }
@@ -114,6 +117,7 @@ class World {
   bool receive();
   bool start_frame();
   bool sample();
+  void count_unsolved();
   void push_sample();
   void move(Body& body, int64_t duration_us) const;
   void transmit();
@@ -149,7 +153,9 @@ class World {
   int32_t last_raw_ = 0;
   int64_t last_sample_us_ = 0;
   int64_t next_sample_us_;
-  int unsolved_ = 0;
+  int unsolved_ = 0;  // samples in a row
+  int64_t unsolved_samples_ = 0;
+  double largest_residual_ = 0;
 };
 
 }  // namespace sim

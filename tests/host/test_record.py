@@ -17,6 +17,7 @@ from mcap.writer import Writer
 from setae.errors import InputError, LogError
 from setae.record import FLUSH_US, TOPICS, Recorder, read
 from setae.record.topics import JSON_RECORD, PROFILE
+from setae.report import solving
 
 METADATA: dict[str, Any] = {
     "simulated": True,
@@ -324,3 +325,44 @@ def test_a_field_that_holds_objects_is_no_array(tmp_path: Path) -> None:
         recorder.command(0, "move", {"to": 1})
     with pytest.raises(InputError, match="messages"):
         read(path).array("/command", "args")
+
+
+def test_a_log_from_before_the_residuals_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Logs get new fields; those that lack them are whole all the same."""
+    path = tmp_path / "old.mcap"
+    before = {name: field for name, field in TOPICS["/truth"].items() if "residual" not in name}
+    del before["unsolved_samples"]
+    old = {"backbone_mm": np.zeros((21, 3)), "filament_mm": np.zeros((2, 3)),
+           "arm_mm": np.zeros(3), "contact_depth_mm": 0.0, "contact_point_mm": np.zeros(3),
+           "tension_n": np.zeros(4), "pressure_hpa": 1013.0}  # fmt: skip
+    with Recorder(path) as recorder, monkeypatch.context() as patch:
+        patch.setitem(TOPICS, "/truth", before)
+        recorder.write("/truth", 0, old)
+    log = read(path)
+    assert log.damage is None
+    assert np.isnan(log.array("/truth", "largest_residual")).all()
+    assert solving.told([log]) == ""
+
+
+@pytest.mark.parametrize(
+    ("unsolved", "said"),
+    [
+        (0, "solved in every sample; the largest residual is 9e-05"),
+        (2, "2 samples of the spring’s"),
+    ],
+)
+def test_a_report_says_how_well_the_spring_was_solved(
+    tmp_path: Path, unsolved: int, said: str
+) -> None:
+    path = tmp_path / "run.mcap"
+    with Recorder(path) as recorder:
+        for done in (0, 1):
+            recorder.truth(
+                done, backbone_mm=np.zeros((21, 3)), filament_mm=np.zeros((2, 3)),
+                arm_mm=np.zeros(3), contact_depth_mm=0.0, contact_point_mm=np.zeros(3),
+                tension_n=np.zeros(4), pressure_hpa=1013.0, plant_residual=1e-6,
+                largest_residual=9e-5, unsolved_samples=done * unsolved,
+            )  # fmt: skip
+    assert said in solving.told([read(path)])

@@ -11,9 +11,7 @@ import pytest
 if TYPE_CHECKING:
     from tests.simulator.conftest import Driver, MakeDriver
 
-from setae.sim import SimulationError, Truth
-
-SOLVED = 1e-4
+from setae.sim import SOLVED, SimulationError, Truth
 
 
 def tip(truth: Truth) -> npt.NDArray[np.float64]:
@@ -155,3 +153,13 @@ def test_a_spring_without_a_solution_is_an_error(make_driver: MakeDriver) -> Non
 
     with pytest.raises(SimulationError, match="equilibrium"):
         wander()
+
+
+def test_how_well_it_is_solved_is_in_the_truth(driver: Driver) -> None:
+    """It was of the last sample only: one without a solution in between passed unseen."""
+    for lengths_mm in ((40.0, 50.0, 60.0, 50.0), (60.0, 35.0, 60.0, 70.0)):
+        truth = driver.pull(lengths_mm)
+        assert truth.solved
+        assert 0 < truth.largest_residual < SOLVED
+        assert truth.unsolved_samples == 0
+    assert truth.plant_iterations >= 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +11,8 @@ import numpy.typing as npt
 import pytest
 
 from setae.errors import InputError
-from setae.sim import Spring
+from setae.sim import Rest, SimulationError, Spring, plants
+from setae.sim.spring import Start
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import MakeDriver
@@ -144,3 +147,31 @@ def test_the_robot_with_two_slack_tendons_rests_where_it_came_from(make_driver: 
         # The servos' dead band leaves other lengths than were sent.
         there = Spring().rests(truth.servo_length_mm)
         assert min(np.linalg.norm(truth.backbone_mm[-1] - rest.top_mm) for rest in there) < 0.05
+
+
+def test_a_start_without_a_rest_leaves_the_others_and_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One of 25 that did not settle raised, and the rests that the others found were lost."""
+    lost = Start(bend_deg=(60.0, 60.0))
+    rest = Spring._rest
+
+    def failing(spring: Spring, lengths_mm: Sequence[float] | Array, start: Start) -> Rest:
+        found = rest(spring, lengths_mm, start)
+        return dataclasses.replace(found, residual=1.0) if start == lost else found
+
+    monkeypatch.setattr(Spring, "_rest", failing)
+    rests = Spring().rests([63.0, 34.0, 63.0, 34.0])
+    assert len(rests) == 2
+    assert rests.unsettled == (lost,)
+    with pytest.raises(SimulationError, match="no rest"):
+        Spring().rest([63.0, 34.0, 63.0, 34.0], bend_deg=lost.bend_deg)
+
+
+def test_a_hopeless_start_is_numbers_still() -> None:
+    """Crushed beyond its coils it had no way to fall, and was pushed to NaN, for 3,000 steps."""
+    spring = Spring(parameters=plants.parameters("paper_like"))
+    lengths_mm = [40.22759199107641, 29.925652225462766, 24.537652280956095, 49.01661929934254]
+    for start in [Start((x, y), (y / 4, -x / 4)) for x in (-60, 60) for y in (-60, 60)]:
+        rest = spring._rest(lengths_mm, start)
+        assert np.isfinite([rest.residual, *rest.top_mm]).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from collections.abc import Sequence
@@ -27,6 +28,7 @@ from setae.report.causes import picture, section
 from setae.report.validation_pictures import bubbles_picture
 from setae.robot import Robot
 from setae.scene import open_scene
+from setae.sim import Truth, World
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -307,3 +309,26 @@ def test_causes_go_on_where_they_were_interrupted(
 
 def _picture(folder: Path, effects: Sequence[causes.Effect]) -> Path:
     return picture(folder / "causes.png", effects, "Simulated.")
+
+
+def test_a_pose_without_a_solution_is_no_measurement(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever the spring was when its equilibrium was not found counted as measured."""
+    truth = World.truth
+
+    def unsolved_towards_x(world: World) -> Truth:
+        found = truth(world)
+        bent = found.backbone_mm[-1][0] > 10
+        return dataclasses.replace(found, plant_residual=0.5) if bent else found
+
+    monkeypatch.setattr(World, "truth", unsolved_towards_x)
+    out = tmp_path / "run"
+    code, printed, errors = run(capsys, "--sim", "--targets", "5", "--out", str(out))
+    assert code == 0, errors
+    (one,) = runs_in(out)
+    assert [pose.target.group for pose in one.poses] == ["compression", "-X", "+Y", "-Y"]
+    (label,) = one.unsolved
+    assert label.startswith("+X")
+    for text in (printed, (out / "report.html").read_text()):
+        assert f"had no solution there: {label} (residual 0.5)" in " ".join(text.split())

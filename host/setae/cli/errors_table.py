@@ -39,7 +39,9 @@ def print_runs(found: Sequence[runs.Run]) -> None:
             say(f"Model {run.model}: {counted(len(run.poses), 'target')}, {run.source}.")
             say("Errors in mm, mean±SD; in the bending plane, but for the last column:")
             console.print(_table(run.poses))
-        else:
+        if run.unsolved:
+            say(f"Model {run.model}: {run.unsolved_text}.")
+        elif not run.poses:
             say(
                 f"Model {run.model}: {counted(len(run.visited), 'target')} driven, none measured. "
                 "Measure the pictures, then give them with --positions and the same --out."

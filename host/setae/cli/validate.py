@@ -20,7 +20,7 @@ from setae.errors import InputError
 from setae.experiments import causes as why
 from setae.experiments import positions as measurements
 from setae.experiments import runs, view
-from setae.experiments.events import Event
+from setae.experiments.events import Event, OnEvent
 from setae.experiments.targets import Target, choose, paper_targets
 from setae.experiments.validate import Noise, measured, validate
 from setae.robot import Robot
@@ -268,22 +268,31 @@ class _Drive:
                         status.update(f"Model {model}: {count} of {len(targets)} targets")
 
                 validate(
-                    opened.robot, targets, self._measure(opened, len(targets)),
+                    opened.robot, targets, self._measure(opened, len(targets), on_event),
                     model=model, on_event=on_event,
                 )  # fmt: skip
 
-    def _measure(self, opened: rig.Rig, count: int) -> Callable[[Target], FloatArray | None]:
+    def _measure(
+        self, opened: rig.Rig, count: int, on_event: OnEvent
+    ) -> Callable[[Target], FloatArray | None]:
         if opened.world is None:
             return _ask_for_picture(opened.robot, count)
-        return _look(opened, self._noise)
+        return _look(opened, self._noise, on_event)
 
 
-def _look(opened: rig.Rig, noise: Noise) -> Callable[[Target], FloatArray]:
+def _look(
+    opened: rig.Rig, noise: Noise, on_event: OnEvent
+) -> Callable[[Target], FloatArray | None]:
     world = opened.world
     assert world is not None
 
-    def look(target: Target) -> FloatArray:
-        return np.asarray(world.truth().backbone_mm[-1] + noise.on(target))
+    def look(target: Target) -> FloatArray | None:
+        truth = world.truth()
+        if not truth.solved:  # then it is no rest, and no measurement
+            found = {"label": target.label, "residual": truth.plant_residual}
+            on_event(Event(time_us=truth.time_us, name=runs.UNSOLVED, data=found))
+            return None
+        return np.asarray(truth.backbone_mm[-1] + noise.on(target))
 
     return look
 
@@ -371,5 +380,16 @@ def _study(
                 ) as opened,
             ):  # fmt: skip
                 opened.robot.enable()
-                poses = validate(opened.robot, targets, _look(opened, noise), model=case.model)
+                missed: list[str] = []
+
+                def miss(event: Event, missed: list[str] = missed) -> None:
+                    missed.append(str(event.data["label"]))
+
+                look = _look(opened, noise, miss)
+                poses = validate(opened.robot, targets, look, model=case.model)
             recorder.experiment(number * 1_000_000, "case", why.told(case, poses))
+            if missed:
+                say(
+                    f"{case.name}: not measured, for the simulated spring had no solution there: "
+                    f"{', '.join(missed)}."
+                )

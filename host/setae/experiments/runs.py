@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,14 @@ from setae.experiments.accuracy import Pose
 from setae.experiments.targets import Target, find, paper_targets
 from setae.record import Log
 
-__all__ = ["EXPERIMENT", "Run", "of_kind", "read"]
+__all__ = ["EXPERIMENT", "UNSOLVED", "Run", "of_kind", "read"]
 
-EXPERIMENT = "validate"
+EXPERIMENT: Final = "validate"
 """What the metadata of such a log names."""
+
+
+UNSOLVED: Final = "unsolved"
+"""Event of a target at which the simulated spring had come to no solution: label, residual."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -37,6 +41,9 @@ class Run:
     cut_mm
         By how much the commands fell short of what the model asked for, by label,
         where they did.
+    unsolved
+        Labels of the targets that were not measured, because the simulated spring had come to
+        no solution there, with the residual.
     complete
         Whether a log came to its end: one that is resumed drives to all that is left.
     targets
@@ -51,6 +58,7 @@ class Run:
     poses: tuple[Pose, ...]
     visited: tuple[str, ...]
     cut_mm: dict[str, float]
+    unsolved: dict[str, float]
     complete: bool
     targets: tuple[Target, ...]
     config: Config
@@ -75,6 +83,15 @@ class Run:
     def noise_sd_mm(self) -> float:
         """What was added to true positions, along each axis."""
         return float(self.metadata.get("noise_sd_mm") or 0.0)
+
+    @property
+    def unsolved_text(self) -> str:
+        """Which targets were not measured for want of a solution, in words; empty without any."""
+        if not self.unsolved:
+            return ""
+        places = ", ".join(f"{label} (residual {value:.1g})" for label, value in
+                           self.unsolved.items())  # fmt: skip
+        return f"not measured, for the simulated spring had no solution there: {places}"
 
     @property
     def source(self) -> str:
@@ -122,7 +139,10 @@ def _run(model: str, logs: Sequence[Log]) -> Run:
     targets = paper_targets(config)
     found: dict[str, Pose | None] = {}
     cut_mm: dict[str, float] = {}
+    unsolved: dict[str, float] = {}
     for log in logs:
+        for event in log.events(UNSOLVED):
+            unsolved[str(event.data["label"])] = float(event.data["residual"])
         for event in log.events("target"):
             target = find(str(event.data["label"]), targets)
             if target is None:
@@ -141,6 +161,7 @@ def _run(model: str, logs: Sequence[Log]) -> Run:
         poses=tuple(pose for pose in poses if pose is not None),
         visited=tuple(found),
         cut_mm=cut_mm,
+        unsolved=unsolved,
         complete=any(log.events("validate_end") for log in logs),
         targets=targets,
         config=config,

@@ -137,7 +137,7 @@ class Log:
             raise InputError(f"{topic} has no field {field!r}.", f"It has: {known}.")
         if "object" in TOPICS[topic][field]["type"]:
             raise InputError(f"{field!r} of {topic} is no array.", f"Use messages({topic!r}).")
-        values = [m[field] for m in self._messages.get(topic, ())]
+        values = [m.get(field) for m in self._messages.get(topic, ())]
         kind = TOPICS[topic][field]["type"]
         if kind == "boolean":
             return np.array(values, dtype=bool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -20,6 +21,7 @@ FLUSH_US: Final = 1_000_000  # a killed run loses at most this much
 
 # Of the simulator's lengths and forces: plenty for a picture, and it halves the file.
 _TRUTH_DECIMALS: Final = 4
+_RESIDUAL_DECIMALS: Final = 9
 
 
 class Recorder:
@@ -316,8 +318,14 @@ class Recorder:
         contact_point_mm: ArrayLike,
         tension_n: ArrayLike,
         pressure_hpa: float,
+        plant_residual: float = math.nan,
+        largest_residual: float = math.nan,
+        unsolved_samples: float = math.nan,
     ) -> None:
-        """The simulator's own state; shapes (21, 3), (2, 3), (3,), -, (3,), (4,), -."""
+        """The simulator's own state; shapes (21, 3), (2, 3), (3,), -, (3,), (4,), -.
+
+        The last three say how well the plant is solved: here, and in all samples until now.
+        """
         self._add(
             "/truth",
             time_us,
@@ -329,6 +337,9 @@ class Recorder:
                 "contact_point_mm": _rounded(contact_point_mm, _TRUTH_DECIMALS),
                 "tension_n": _rounded(tension_n, _TRUTH_DECIMALS),
                 "pressure_hpa": round(float(pressure_hpa), DECIMALS),
+                "plant_residual": round(plant_residual, _RESIDUAL_DECIMALS),
+                "largest_residual": round(largest_residual, _RESIDUAL_DECIMALS),
+                "unsolved_samples": unsolved_samples,
             },
         )
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from setae.report import drawing, extras, imperfections, palette, paper, shapes, template
+from setae.report import drawing, extras, imperfections, palette, paper, shapes, solving, template
 from setae.report.scene import floor_mm
 from setae.report.tables import Comparison, compare
 from setae.report.trial import Trial, origin_note
@@ -184,6 +184,7 @@ def _origin(trials: Sequence[Trial]) -> str:
     versions = metadata.get("versions") or {}
     if isinstance(versions, Mapping) and versions:
         rows.append(("versions", ", ".join(f"{name} {v}" for name, v in sorted(versions.items()))))
+    rows += solving.row(trial.log for trial in trials)
     rows.append(("logs", ", ".join(trial.log.path.name for trial in trials)))
     for trial in trials:
         if trial.log.damage:

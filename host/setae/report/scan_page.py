@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from setae.heightmap import TOUCHED
-from setae.report import extras, palette, template
+from setae.report import extras, palette, solving, template
 from setae.report.scan_pictures import cloud, top_mm
 from setae.report.scan_reading import Scan
 from setae.wording import counted
@@ -151,6 +151,7 @@ def _origin(scans: Sequence[Scan]) -> str:
     versions = first.metadata.get("versions") or {}
     if isinstance(versions, Mapping) and versions:
         rows.append(("versions", ", ".join(f"{name} {v}" for name, v in sorted(versions.items()))))
+    rows += solving.row(log for scan in scans for log in scan.logs)
     rows.append(("logs", ", ".join(log.path.name for scan in scans for log in scan.logs)))
     for scan in scans:
         if scan.problem:

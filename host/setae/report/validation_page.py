@@ -12,7 +12,7 @@ import numpy as np
 
 from setae.experiments.accuracy import OVERALL, Spread, Summary, by_group
 from setae.experiments.runs import Run
-from setae.report import extras, palette, paper, template
+from setae.report import extras, palette, paper, solving, template
 from setae.report.validation_pictures import COLOURS, origin_note
 from setae.wording import counted
 
@@ -164,6 +164,8 @@ def _origin(runs: Sequence[Run]) -> str:
                     _CUT.format(len(run.cut_mm), max(run.cut_mm.values())),
                 )
             )
+        if run.unsolved:
+            rows.append(("", run.unsolved_text))
         if not run.complete:
             rows.append(("", "the run ended early"))
         rows += [(log.path.name, str(log.damage)) for log in run.logs if log.damage]
@@ -176,6 +178,7 @@ def _origin(runs: Sequence[Run]) -> str:
     versions = metadata.get("versions") or {}
     if isinstance(versions, Mapping) and versions:
         rows.append(("versions", ", ".join(f"{k} {v}" for k, v in sorted(versions.items()))))
+    rows += solving.row(log for run in runs for log in run.logs)
     rows.append(("logs", ", ".join(log.path.name for run in runs for log in run.logs)))
     items = "".join(f"<dt>{html.escape(a)}</dt><dd>{html.escape(b)}</dd>" for a, b in rows)
     return f"<dl>{items}</dl>"

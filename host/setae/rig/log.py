@@ -180,4 +180,7 @@ class RigLog:
             else truth.contact_point_mm,
             tension_n=truth.tension_n,
             pressure_hpa=truth.pressure_hpa,
+            plant_residual=truth.plant_residual,
+            largest_residual=truth.largest_residual,
+            unsolved_samples=truth.unsolved_samples,
         )

@@ -13,10 +13,11 @@ from setae.sim.solids import add_solid
 from setae.sim.spring import Rest, Spring
 from setae.sim.stage import Follower, SimulatedStage
 from setae.sim.transport import SimTransport
-from setae.sim.truth import SensorFault, Truth
+from setae.sim.truth import SOLVED, SensorFault, Truth
 from setae.sim.world import World, parameter_names
 
 __all__ = [
+    "SOLVED",
     "Follower",
     "PluginError",
     "Rest",

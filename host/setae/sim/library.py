@@ -71,6 +71,9 @@ class CTruth(ctypes.Structure):
         ("bent_tip_mm", c_double * 3),
         ("pressure_hpa", c_double),
         ("plant_residual", c_double),
+        ("largest_residual", c_double),
+        ("unsolved_samples", c_int64),
+        ("plant_iterations", c_int64),
     )
 
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from setae.errors import InputError
 from setae.sim.library import CRest, SimulationError, load
+from setae.sim.truth import SOLVED
 from setae.sim.world import World
 
-__all__ = ["Rest", "Spring"]
+__all__ = ["Rest", "Rests", "Spring", "Start"]
 
 Array = NDArray[np.float64]
 
-_SOLVED = 1e-4
 _SAME_MM = 0.1
 _SAME_RAD = 0.01
 _BENDS_DEG = (-60.0, 0.0, 60.0)
@@ -58,6 +58,40 @@ class Rest:
         turn = 0.5 * (np.trace(self.rotation.T @ other.rotation) - 1)
         away_mm = float(np.linalg.norm(self.top_mm - other.top_mm))
         return away_mm < _SAME_MM and math.acos(min(1.0, max(-1.0, float(turn)))) < _SAME_RAD
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """How a spring is held before it is let go.
+
+    Attributes
+    ----------
+    bend_deg
+        Bent about x and y.
+    shift_mm
+        Its top moved along x and y.
+    """
+
+    bend_deg: tuple[float, float] = (0.0, 0.0)
+    shift_mm: tuple[float, float] = (0.0, 0.0)
+
+
+class Rests(tuple[Rest, ...]):
+    """Stable rests, lowest energy first.
+
+    Attributes
+    ----------
+    unsettled : tuple of Start
+        From where the spring was let go and found no equilibrium: what lies there is unknown.
+    """
+
+    unsettled: tuple[Start, ...]
+
+    def __new__(cls, found: Iterable[Rest], unsettled: Iterable[Start]) -> Rests:
+        """Sort the rests."""
+        rests = super().__new__(cls, sorted(found, key=lambda rest: rest.energy_n_mm))
+        rests.unsettled = tuple(unsettled)
+        return rests
 
 
 class Spring:
@@ -119,20 +153,28 @@ class Spring:
         SimulationError
             It found no rest.
         """
+        rest = self._rest(lengths_mm, Start(bend_deg, shift_mm))
+        if not rest.residual < SOLVED:
+            raise SimulationError(
+                "The spring found no rest at these tendon lengths.",
+                "Ask `rests`, which lets it go from elsewhere, too.",
+            )
+        return rest
+
+    def _rest(self, lengths_mm: Sequence[float] | Array, start: Start) -> Rest:
+        """As `rest`, solved or not."""
         if len(lengths_mm) != self._tendons:
             raise InputError(f"{len(lengths_mm)} lengths for {self._tendons} tendons.")
         out = CRest()
         status = self._library.setae_spring_rest(
             self._handle,
             (ctypes.c_double * self._tendons)(*lengths_mm),
-            (ctypes.c_double * 2)(*np.radians(bend_deg)),
-            (ctypes.c_double * 2)(*shift_mm),
+            (ctypes.c_double * 2)(*np.radians(start.bend_deg)),
+            (ctypes.c_double * 2)(*start.shift_mm),
             ctypes.byref(out),
         )
         if status != 0:
             raise InputError("A tendon's length is not a positive number, or a start not finite.")
-        if not out.residual < _SOLVED:
-            raise SimulationError("The spring found no rest at these tendon lengths.")
         return Rest(
             top_mm=np.array(out.position_mm),
             rotation=np.array(out.rotation).reshape(3, 3),
@@ -142,26 +184,34 @@ class Spring:
             stable=bool(out.stable),
         )
 
-    def rests(self, lengths_mm: Sequence[float] | Array) -> tuple[Rest, ...]:
+    def rests(self, lengths_mm: Sequence[float] | Array) -> Rests:
         """Search all stable rests at some tendon lengths, lowest energy first.
 
         From 25 starts, bent to all sides and with the top moved to all sides. A search is no
         proof: what none of them leads to is not found.
 
+        Returns
+        -------
+        Rests
+            A tuple of them, and in ``unsettled`` the starts from which it found no equilibrium.
+
         Raises
         ------
-        InputError, SimulationError
+        InputError
             As by `rest`.
         """
         found: list[Rest] = []
-        starts = [((x, y), (0.0, 0.0)) for x, y in product(_BENDS_DEG, _BENDS_DEG)]
-        starts += [((0.0, 0.0), (x, y)) for x, y in product(_SHIFTS_MM, _SHIFTS_MM)]
-        starts += [((x, y), (y / 4, -x / 4)) for x, y in product((-60.0, 60.0), (-60.0, 60.0))]
-        for bend_deg, shift_mm in dict.fromkeys(starts):
-            rest = self.rest(lengths_mm, bend_deg=bend_deg, shift_mm=shift_mm)
-            if rest.stable and not any(rest.same_as(other) for other in found):
+        unsettled: list[Start] = []
+        starts = [Start(bend_deg=(x, y)) for x, y in product(_BENDS_DEG, _BENDS_DEG)]
+        starts += [Start(shift_mm=(x, y)) for x, y in product(_SHIFTS_MM, _SHIFTS_MM)]
+        starts += [Start((x, y), (y / 4, -x / 4)) for x, y in product((-60.0, 60.0), (-60.0, 60.0))]
+        for start in dict.fromkeys(starts):
+            rest = self._rest(lengths_mm, start)
+            if not rest.residual < SOLVED:
+                unsettled.append(start)
+            elif rest.stable and not any(rest.same_as(other) for other in found):
                 found.append(rest)
-        return tuple(sorted(found, key=lambda rest: rest.energy_n_mm))
+        return Rests(found, unsettled)
 
     def __del__(self) -> None:
         if getattr(self, "_handle", None):

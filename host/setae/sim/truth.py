@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SensorFault", "Truth"]
+__all__ = ["SOLVED", "SensorFault", "Truth"]
+
+SOLVED: Final = 1e-4
+"""Scaled gradient norm, root of N mm, below which an equilibrium is solved: the tip is within
+0.01 mm."""
 
 Array = NDArray[np.float64]
 
@@ -61,7 +66,14 @@ class Truth:
     pressure_hpa
         Pressure at the sensor's last sample, noise included.
     plant_residual
-        Scaled gradient norm of the equilibrium; below 1e-4 it is solved.
+        Scaled gradient norm of the equilibrium; below `SOLVED` it is solved. NaN for a plug-in,
+        of which nobody knows.
+    plant_iterations
+        Newton's steps to it.
+    largest_residual
+        Of the samples since power-on; NaN for a plug-in.
+    unsolved_samples
+        How many of them have no solution.
     """
 
     time_us: int
@@ -80,3 +92,11 @@ class Truth:
     bent_tip_mm: Array
     pressure_hpa: float
     plant_residual: float
+    plant_iterations: int
+    largest_residual: float
+    unsolved_samples: int
+
+    @property
+    def solved(self) -> bool:
+        """Whether the equilibrium is solved, as far as anybody knows."""
+        return not self.plant_residual >= SOLVED

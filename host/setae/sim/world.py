@@ -336,6 +336,9 @@ class World:
             bent_tip_mm=now["bent_tip_mm"],
             pressure_hpa=raw.pressure_hpa,
             plant_residual=raw.plant_residual,
+            plant_iterations=raw.plant_iterations,
+            largest_residual=raw.largest_residual,
+            unsolved_samples=raw.unsolved_samples,
         )
 
     def _look(self) -> CTruth:
