@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from setae.report import shifts
 from setae.report.tables import compare
 from setae.report.trial import Contact, Trial
 
@@ -20,19 +21,23 @@ _BEFORE_US = 250_000
 
 def section(trials: Sequence[Trial]) -> str:
     """Return the page's part about it; empty for a real robot and for the ideal one."""
-    told = sentences(trials)
+    told, found = _look(trials)
     if not told:
         return ""
     items = "".join(f"<li>{html.escape(text)}</li>" for text in told)
-    return f'<h2 id="plant">What the imperfections did</h2><ol>{items}</ol>'
+    return f'<h2 id="plant">What the imperfections did</h2><ol>{items}</ol>{shifts.table(found)}'
 
 
 def sentences(trials: Sequence[Trial]) -> list[str]:
     """Say where the tip was beside its target, and how each stop came about that differs."""
+    return _look(trials)[0]
+
+
+def _look(trials: Sequence[Trial]) -> tuple[list[str], list[shifts.Aside]]:
     first = trials[0]
     parameters = first.log.metadata.get("plant_parameters") or {}
     if not first.simulated or not parameters:
-        return []
+        return [], []
     told = []
     beside_mm = [value for trial in trials for value in _beside_mm(trial)]
     if beside_mm:
@@ -48,14 +53,19 @@ def sentences(trials: Sequence[Trial]) -> list[str]:
             f" {np.mean(aside_mm):.1f} mm aside on average, {max(aside_mm):.1f} mm at most."
         )
     rows = compare(trials)
-    differing = [row.trial for row in rows if row.agrees is False or not row.trial.complete]
-    for trial in differing:
-        told += [f"Trial {trial.number} {text}" for text in _why(trial)]
+    differing = [row for row in rows if row.agrees is False or not row.trial.complete]
+    found = []
+    for row in differing:
+        texts = _why(row.trial)
+        if aside := shifts.look(row):
+            found.append(aside)
+            texts.append(shifts.sentence(aside))
+        told += [f"Trial {row.trial.number} {text}" for text in texts]
     if differing:
         told.append(f"Its imperfections: {_named(parameters)}.")
     if beside_mm and all(row.agrees for row in rows):
         told.append("Every trial came out as the paper’s all the same.")
-    return told
+    return told, found
 
 
 def _named(parameters: Mapping[str, float]) -> str:
