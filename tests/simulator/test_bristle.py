@@ -137,6 +137,36 @@ def test_noise_and_drift_are_as_asked(make_driver: MakeDriver) -> None:
     assert steps.std() == pytest.approx(0.5 / np.sqrt(75), rel=0.1)
 
 
+def test_a_bristle_with_little_damping_rings_after_a_move(make_driver: MakeDriver) -> None:
+    swing_hpa = {}
+    for ratio in (0.1, 0.5, 1.5):
+        driver = make_driver({"bristle.damping_ratio": ratio})
+        driver.pull(60.0, duration_s=0.1, rest_s=0.1)
+        first = len(driver.samples)
+        driver.wait(0.2)
+        swing_hpa[ratio] = np.ptp(driver.pressures_hpa(first))
+    assert swing_hpa[0.1] > 3 * swing_hpa[0.5] > 0
+    assert swing_hpa[0.1] > 3 * swing_hpa[1.5]
+
+
+def test_the_air_s_own_pressure_is_in_every_sample(make_driver: MakeDriver) -> None:
+    # As on a mountain. What counts is only the change.
+    sea_hpa, hill_hpa = (
+        make_driver({"sensor.ambient_hpa": ambient_hpa}).pressures_hpa()
+        for ambient_hpa in (1013.25, 700.0)
+    )
+    assert sea_hpa == pytest.approx(1013.25, abs=0.01)
+    assert sea_hpa - hill_hpa == pytest.approx(313.25, abs=0.001)
+
+
+@pytest.mark.parametrize("rate_hz", [25.0, 50.0])
+def test_a_sensor_may_sample_at_another_rate(make_driver: MakeDriver, rate_hz: float) -> None:
+    driver = make_driver({"sensor.rate_hz": rate_hz})
+    driver.wait(4.0)
+    times_us = np.array([time for time, _ in driver.samples])
+    assert 1e6 / np.diff(times_us).mean() == pytest.approx(rate_hz, rel=0.002)
+
+
 @pytest.mark.parametrize("rate_error", [-0.03, 0.0, 0.03])
 def test_samples_come_at_the_sensor_s_own_rate(make_driver: MakeDriver, rate_error: float) -> None:
     driver = make_driver({"sensor.rate_error": rate_error})
