@@ -9,7 +9,7 @@ from tests.ur.controller import FakeController, patient
 
 from setae import rig
 from setae.config import Config, load
-from setae.errors import ArmFrozenError, StoppedError
+from setae.errors import ArmBoxError, ArmFrozenError, StoppedError
 from setae.experiments.explore import explore
 from setae.link.events import Event
 from setae.scene import Obstacle, tube_scene
@@ -39,6 +39,22 @@ def test_a_trial_finds_the_cube_and_brings_the_arm_back(fake: FakeController) ->
         assert opened.world is not None
         opened.robot.session.run_for(1_000_000)
         assert opened.world.arm_mm == pytest.approx(opened.stage.position_mm, abs=0.01)
+
+
+def test_a_level_outside_of_the_box_is_told_before_anything_moves(fake: FakeController) -> None:
+    """Each move was checked when its turn came: the trial went down a level, felt around, and
+    ended with the arm left there.
+    """
+    config = quick(step_mm=20.0)
+    deep = dataclasses.replace(config.explore, steps=5)
+    box = dataclasses.replace(config.ur, box_min_mm=(0.0, 0.0, 460.0))
+    config = dataclasses.replace(config, explore=deep, ur=box)
+    with rig.open("sim://", config=config, stage=fake.url) as opened:
+        opened.robot.enable()
+        with pytest.raises(ArmBoxError, match=r"z = 440\.0 mm"):
+            explore(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
+        assert opened.stage.position_mm == pytest.approx((0, 0, 0), abs=0.1)
+        assert opened.robot.lengths_mm == pytest.approx([70.0] * 4, abs=0.1)
 
 
 def test_an_arm_that_freezes_while_it_lowers_stops_the_robot(fake: FakeController) -> None:

@@ -27,6 +27,7 @@ from setae.experiments.descent import (
 )
 from setae.experiments.events import Event, OnEvent
 from setae.experiments.explore import ExploreResult, run_trials
+from setae.experiments.reach import require_reachable
 from setae.robot import Robot
 from setae.scene import Obstacle, tube_scene
 from setae.stage import Enter, ManualStage
@@ -91,6 +92,8 @@ def explore(
                 pollables=[interrupts],
             ) as opened,
         ):
+            # Before anybody is asked for anything; `explore` looks again, for whoever calls it.
+            require_reachable(opened.stage, arm_targets_mm(config))
             # Only now, so that a board that isn't there costs neither work nor a folder.
             log = folder() / f"trial-{number}.mcap"
             if run.force:

@@ -26,8 +26,15 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from setae.errors import SetaeError
-from setae.experiments.descent import Point, scan_directions_deg, targets_mm, tip_in_world
+from setae.experiments.descent import (
+    Point,
+    arm_targets_mm,
+    scan_directions_deg,
+    targets_mm,
+    tip_in_world,
+)
 from setae.experiments.events import Event, OnEvent
+from setae.experiments.reach import require_reachable
 from setae.robot import Contact, Robot
 from setae.scene import Obstacle
 from setae.stage import Stage, move_timeout_s
@@ -130,10 +137,14 @@ def explore(
     ------
     UnreachableError
         The robot can't reach a target of the scan; nothing has moved.
+    ArmBoxError
+        A level lies outside the arm's box; nothing has moved.
     SetaeError
         Whatever ended the trial; the arm stays where it stopped.
     """
-    return _Trial(robot, stage, obstacle, on_event, arm_timeout_s).run()
+    trial = _Trial(robot, stage, obstacle, on_event, arm_timeout_s)
+    require_reachable(stage, arm_targets_mm(robot.config))
+    return trial.run()
 
 
 class _Trial:

@@ -16,6 +16,7 @@ from setae import rig
 from setae.config import Config, Scan
 from setae.errors import InputError, SetaeError
 from setae.experiments.events import OnEvent
+from setae.experiments.reach import require_reachable
 from setae.experiments.scan import adaptive, cycles
 from setae.experiments.scan.steps import Feeling, Steps, contact_data
 from setae.experiments.scan.survey import Cell, Place, Survey
@@ -25,7 +26,6 @@ from setae.objects import TableScene
 from setae.record import Recorder
 from setae.robot import Robot
 from setae.stage import Stage
-from setae.ur import UrStage
 
 Mode: TypeAlias = Literal["paper", "safe", "adaptive"]
 MODES: Final[tuple[Mode, ...]] = ("paper", "safe", "adaptive")
@@ -137,9 +137,7 @@ def scan(
     require_window(config, config.scan.tallest_mm)
     survey = Survey(config.scan)
     survey.resume(known)
-    if isinstance(stage, UrStage):
-        for target_mm in arm_targets_mm(config.scan):
-            stage.require_reachable(target_mm)
+    require_reachable(stage, arm_targets_mm(config.scan))
     steps = Steps(robot, stage, config, on_event=on_event, arm_timeout_s=arm_timeout_s)
     try:
         return _run(steps, survey, config.scan, mode, earlier_s, scene or {})
