@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import itertools
+import json
 import os
 import select
 import signal
@@ -12,10 +13,11 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from setae.config import Ur
 
-_SCRIPT = Path(__file__).with_name("fake_controller.py")
+_ROOT = Path(__file__).parents[2]
 _READY_TIMEOUT_S = 30
 # ur-rtde can't be told a port: each controller has an address of its own.
 _addresses = (f"127.7.{os.getpid() % 250 + 1}.{last}" for last in itertools.count(1))
@@ -33,15 +35,25 @@ class FakeController:
         self.address = next(_addresses)
         self.url = f"ur://{self.address}"
         self._process = subprocess.Popen(
-            [sys.executable, str(_SCRIPT), self.address],
+            [sys.executable, "-m", "tests.ur.fake_controller", self.address],
+            cwd=_ROOT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
+        assert self._line() == "ready\n"
+
+    def _line(self) -> str:
         assert self._process.stdout is not None
         readable, _, _ = select.select([self._process.stdout], [], [], _READY_TIMEOUT_S)
         assert readable
-        assert self._process.stdout.readline() == "ready\n"
+        return self._process.stdout.readline()
+
+    def told(self) -> dict[str, Any]:
+        """What it was told, and where its flange is; see `Fake.told`."""
+        self.tell("tell")
+        told: dict[str, Any] = json.loads(self._line())
+        return told
 
     def tell(self, line: str) -> None:
         """Have something go wrong; see `Fake.obey`."""

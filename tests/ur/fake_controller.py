@@ -1,6 +1,6 @@
 """A stand-in for a UR controller, good enough for the unmodified ur-rtde.
 
-    python tests/ur/fake_controller.py 127.0.0.7
+    python -m tests.ur.fake_controller 127.0.0.7
 
 Serves what ur-rtde asks for: the dashboard (29999), scripts (30001 to 30003) and RTDE
 version 2 (30004), whose ports it can't be told. So each fake has a loopback address of
@@ -15,6 +15,7 @@ Written from UR's RTDE guide and from what ur-rtde 1.6 sends.
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import struct
 import sys
@@ -25,6 +26,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tests.ur.turns import Turn, after, back, turn_of, turned, vector_of
 
 DASHBOARD, SCRIPTS, RTDE = 29999, (30001, 30002, 30003), 30004
 STEP_S = 0.002
@@ -73,32 +75,25 @@ INPUTS = {
 }  # fmt: skip
 
 # Commands of ur-rtde's control script that do something here.
-MOVE_L, SET_TCP, STOP_L, WATCHDOG, STOP_SCRIPT = 3, 29, 33, 35, 255
+MOVE_L, SET_PAYLOAD, SET_TCP, STOP_L, WATCHDOG, STOP_SCRIPT = 3, 17, 29, 33, 35, 255
 READY, DONE = 1, 2
 
-
-def rotation(vector: list[float]) -> NDArray[np.float64]:
-    """Rodrigues' formula; the fake must not share the host's."""
-    angle = math.hypot(*vector)
-    if angle == 0:
-        return np.eye(3)
-    x, y, z = (value / angle for value in vector)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    turned: NDArray[np.float64] = (
-        np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-    )
-    return turned
+Vector = NDArray[np.float64]
 
 
 @dataclass
 class Fake:
     """The controller's state, and how it changes."""
 
-    flange_m: list[float] = field(default_factory=lambda: [0.4, 0.1, 0.6])
-    turn_rad: list[float] = field(default_factory=lambda: [math.pi, 0.0, 0.0])
+    flange_m: Vector = field(default_factory=lambda: np.array([0.4, 0.1, 0.6]))
+    flange_turn: Turn = (0.0, 1.0, 0.0, 0.0)  # it looks down
     tcp: list[float] = field(default_factory=lambda: [0.0] * 6)
-    speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
-    target_m: NDArray[np.float64] | None = None
+    payload: list[float] = field(default_factory=lambda: [0.0] * 4)
+    move: list[float] = field(default_factory=list)
+    brake: float = 0.0
+    speed: Vector = field(default_factory=lambda: np.zeros(3))
+    target_m: Vector | None = None
+    target_turn: Turn = (1.0, 0.0, 0.0, 0.0)
     speed_max: float = 0.0
     acceleration: float = 1.0
     braking: bool = False
@@ -126,21 +121,45 @@ class Fake:
             self.robot_mode = int(rest)
         elif word == "slider":
             self.slider = float(rest)
-        elif word == "tilt":
-            self.turn_rad = [math.pi - float(rest), 0.0, 0.0]
+        elif word == "flange":
+            self.flange_turn = turn_of([float(value) for value in rest.split()])
         elif word == "stop_program":
             self.playing = False
             self.halt()
+        elif word == "tell":
+            sys.stdout.write(json.dumps(self.told()) + "\n")
+            sys.stdout.flush()
+
+    def told(self) -> dict[str, Any]:
+        """Where the flange is, and what the last commands said; metres and rotation vectors."""
+        return {
+            "flange": [*self.flange_m.tolist(), *vector_of(self.flange_turn)],
+            "tcp": self.tcp,
+            "payload": self.payload,
+            "move": self.move,
+            "brake": self.brake,
+            "watchdog_hz": self.watchdog_hz,
+        }
 
     def halt(self) -> None:
         self.target_m = None
         self.speed = np.zeros(3)
 
-    def tcp_m(self) -> NDArray[np.float64]:
-        offset: NDArray[np.float64] = (
-            np.array(self.flange_m) + rotation(self.turn_rad) @ self.tcp[:3]
-        )
-        return offset
+    @property
+    def tcp_m(self) -> Vector:
+        return self.flange_m + turned(self.flange_turn, self.tcp[:3])
+
+    @property
+    def tcp_turn(self) -> Turn:
+        return after(self.flange_turn, turn_of(self.tcp[3:]))
+
+    def _carry(self, way_m: Vector, share: float) -> None:
+        """Take the TCP along, and turn it by a share of what it has to turn."""
+        here_m, here = self.tcp_m, self.tcp_turn
+        left = vector_of(after(back(here), self.target_turn))
+        there = after(here, turn_of([share * value for value in left]))
+        self.flange_turn = after(there, back(turn_of(self.tcp[3:])))
+        self.flange_m = here_m + way_m - turned(self.flange_turn, self.tcp[:3])
 
     def step(self, step_s: float) -> None:
         """Let a little time pass."""
@@ -156,7 +175,7 @@ class Fake:
                 self.halt()
         if self.target_m is None:
             return
-        left = self.target_m - self.tcp_m()
+        left = self.target_m - self.tcp_m
         left_m = float(np.linalg.norm(left))
         speed = float(np.linalg.norm(self.speed))
         if self.braking:
@@ -165,12 +184,12 @@ class Fake:
             allowed = min(self.speed_max * self.slider, math.sqrt(2 * self.acceleration * left_m))
             speed = min(speed + self.acceleration * step_s, allowed)
         if (self.braking and speed == 0.0) or left_m <= max(speed * step_s, 1e-7):
-            way = np.zeros(3) if self.braking else left
+            if not self.braking:
+                self._carry(left, 1.0)
             self.halt()
         else:
             self.speed = left / left_m * speed
-            way = self.speed * step_s
-        self.flange_m = (np.array(self.flange_m) + way).tolist()
+            self._carry(self.speed * step_s, speed * step_s / left_m)
 
     def _converse(self) -> None:
         """The control script's side of the registers."""
@@ -183,11 +202,15 @@ class Fake:
         values = [float(self.inputs.get(f"input_double_register_{i}", 0.0)) for i in range(12)]
         self.done = True
         if command == MOVE_L:
-            self.target_m = np.array(values[:3])
+            self.move = values[:8]
+            self.target_m, self.target_turn = np.array(values[:3]), turn_of(values[3:6])
             self.speed_max, self.acceleration = values[6], values[7]
             self.braking = False
         elif command == STOP_L:
-            self.braking, self.acceleration = True, values[0]
+            self.brake = self.acceleration = values[0]
+            self.braking = True
+        elif command == SET_PAYLOAD:
+            self.payload = values[:4]
         elif command == SET_TCP:
             self.tcp = values[:6]
         elif command == WATCHDOG:
@@ -198,7 +221,7 @@ class Fake:
 
     def output(self, name: str) -> Any:
         """A variable of RTDE's output."""
-        pose = [*self.tcp_m().tolist(), *self.turn_rad]
+        pose = [*self.tcp_m.tolist(), *vector_of(self.tcp_turn)]
         values = {
             "timestamp": time.monotonic() - self.started_s,
             "actual_TCP_pose": pose,

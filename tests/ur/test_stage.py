@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from tests.ur.controller import FakeController, patient
 
 from setae.config import Config, load
@@ -72,6 +73,52 @@ def test_it_moves_to_where_it_was_sent_in_the_world_that_began_at_its_start(
         assert (x_mm, y_mm, z_mm) == pytest.approx((410, 105, 480), abs=NEAR_MM)
 
 
+def test_frame_d_is_turned_on_the_flange_by_a_rotation_vector(fake: FakeController) -> None:
+    """Nothing looked at frame_d_rotation_deg: with its sign or its convention wrong (roll, pitch
+    and yaw are others), the stand-in would have told the same.
+    """
+    d_mm, d_rotation_deg = (12.0, -7.0, 100.0), (20.0, -35.0, 60.0)
+    on_flange = Rotation.from_rotvec(d_rotation_deg, degrees=True)
+    # Frame D hangs straight down, its x axis 25° off the base's.
+    d_in_base = Rotation.from_euler("z", 25, degrees=True) * Rotation.from_rotvec([np.pi, 0, 0])
+    flange = (d_in_base * on_flange.inv()).as_rotvec()
+    fake.tell("flange {} {} {}".format(*flange))
+    with connected(fake, frame_d_mm=d_mm, frame_d_rotation_deg=d_rotation_deg) as stage:
+        before = fake.told()["flange"]
+        stage.move_to((30, 5, -20))
+        poll_until(stage, lambda: not stage.moving)
+        now = fake.told()["flange"]
+    way_mm = 1000 * (np.array(now[:3]) - before[:3])
+    # The world's x axis is D's, its z axis points up.
+    assert way_mm == pytest.approx(
+        Rotation.from_euler("z", 25, degrees=True).apply((30, 5, -20)), abs=NEAR_MM
+    )
+    assert Rotation.from_rotvec(now[3:]).as_matrix() == pytest.approx(
+        Rotation.from_rotvec(flange).as_matrix(), abs=1e-6
+    ), "the flange turned on the way"
+
+
+def test_the_controller_is_told_what_the_configuration_says(fake: FakeController) -> None:
+    """The stand-in ignored the payload, and any speed would do."""
+    with connected(
+        fake, payload_kg=2.5, payload_centre_mm=(3.0, -4.0, 50.0), watchdog_hz=4.0
+    ) as stage:
+        stage.move_to((0, 0, -1))
+        poll_until(stage, lambda: not stage.moving)
+        told = fake.told()
+        assert told["payload"] == pytest.approx([2.5, 0.003, -0.004, 0.05])
+        assert told["tcp"] == pytest.approx([0, 0, 0.1, 0, 0, 0])
+        assert told["watchdog_hz"] == 4.0
+        assert told["move"][6:] == pytest.approx([0.05, 0.2]), "the configured speed"
+        stage.move_to((0, 0, -40), speed_mm_s=20, acceleration_mm_s2=70)
+        poll_until(stage, lambda: far_on_its_way(stage))
+        stage.stop()
+        poll_until(stage, lambda: not stage.moving)
+        told = fake.told()
+        assert told["move"][6:] == pytest.approx([0.02, 0.07])
+        assert told["brake"] == pytest.approx(0.2)
+
+
 def test_a_stop_ends_the_move_where_it_is(fake: FakeController) -> None:
     with connected(fake) as stage:
         stage.move_to((0, 0, -80))
@@ -100,7 +147,7 @@ def test_a_start_outside_the_box_is_refused(fake: FakeController) -> None:
 
 
 def test_a_flange_that_does_not_look_down_is_refused(fake: FakeController) -> None:
-    fake.tell("tilt 0.2")
+    fake.tell(f"flange {math.pi - 0.2} 0 0")
     with pytest.raises(StageError, match=r"11\.5° off straight down"):
         UrStage(fake.url, with_ur())
 
