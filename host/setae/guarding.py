@@ -15,6 +15,7 @@ from setae.link.events import Tripped
 from setae.link.session import refused_error
 from setae.planning import Planned
 from setae.servo import ServoModel, Ticks
+from setae.stopping import stop_all
 from setae_protocol.messages import (
     PRESSURE_LSB_PER_HPA,
     SERVO_FRAME_US,
@@ -133,8 +134,8 @@ class Guarding:
                 "the guarded motion to end",
                 trips=True,
             )
-        except BaseException:
-            approach.abort()
+        except BaseException as error:
+            stop_all(error, approach.abort)
             raise
         if self._board.trip is not None:
             approach.abort()

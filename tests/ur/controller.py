@@ -24,8 +24,15 @@ _addresses = (f"127.7.{os.getpid() % 250 + 1}.{last}" for last in itertools.coun
 
 
 def patient(settings: Ur) -> Ur:
-    """For a busy machine, on which the stand-in may get no turn for a while."""
-    return dataclasses.replace(settings, state_age_s=5.0, command_deadline_s=20.0, watchdog_hz=0.5)
+    """For a busy machine, on which the stand-in may get no turn for a while; with a box."""
+    return dataclasses.replace(
+        settings,
+        state_age_s=5.0,
+        command_deadline_s=20.0,
+        watchdog_hz=0.5,
+        box_min_mm=(-850.0, -850.0, 50.0),
+        box_max_mm=(850.0, 850.0, 1050.0),
+    )
 
 
 class FakeController:

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import pytest
 from tests.ur.controller import FakeController, patient
 
 from setae import rig
 from setae.config import Config, load
-from setae.errors import ArmBoxError, ArmFrozenError, StoppedError
+from setae.errors import (
+    ArmBoxError,
+    ArmFrozenError,
+    ArmModeError,
+    ArmSafetyError,
+    StageError,
+    StoppedError,
+)
 from setae.experiments.explore import explore
 from setae.link.events import Event
 from setae.scene import Obstacle, tube_scene
@@ -57,22 +65,42 @@ def test_a_level_outside_of_the_box_is_told_before_anything_moves(fake: FakeCont
         assert opened.robot.lengths_mm == pytest.approx([70.0] * 4, abs=0.1)
 
 
-def test_an_arm_that_freezes_while_it_lowers_stops_the_robot(fake: FakeController) -> None:
+@pytest.mark.parametrize(
+    ("happens", "kind", "says"),
+    [
+        (FakeController.freeze, ArmFrozenError, "Nobody knows whether the arm still moves"),
+        (FakeController.close, ArmFrozenError, "Nobody knows whether the arm still moves"),
+        (lambda fake: fake.tell("safety 3"), ArmSafetyError, "protective stop"),
+        (lambda fake: fake.tell("mode 5"), ArmModeError, "has its brakes on"),
+    ],
+    ids=["freezes", "dies", "protective stop", "brakes"],
+)
+def test_an_arm_that_fails_while_it_lowers_stops_the_robot(
+    fake: FakeController,
+    happens: Callable[[FakeController], None],
+    kind: type[StageError],
+    says: str,
+) -> None:
+    """What became of the robot was looked at after a freeze alone. And that one was told as
+    three failures to stop the arm, each with the same remedy, and not as what it was.
+    """
     config = quick()
-    with rig.open("sim://", config=config, stage=fake.url) as opened:
-        opened.robot.enable()
+    with pytest.raises(kind, match=says) as caught:  # noqa: SIM117, PT012
+        with rig.open("sim://", config=config, stage=fake.url) as opened:
+            opened.robot.enable()
 
-        def on_the_way(_: Event) -> None:
-            if opened.stage.moving and -opened.stage.position_mm[2] > ON_THE_WAY_MM:
-                fake.freeze()
+            def on_the_way(_: Event) -> None:
+                if opened.stage.moving and -opened.stage.position_mm[2] > ON_THE_WAY_MM:
+                    happens(fake)
 
-        opened.robot.session.subscribe(on_the_way)
-        with pytest.raises(ArmFrozenError) as caught:
-            explore(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
-        assert opened.robot.state is State.STOPPED
-        assert "can't be told to stop" in "".join(caught.value.__notes__)
-        with pytest.raises(StoppedError):
-            opened.robot.move_to((0, 0, 60))
+            opened.robot.session.subscribe(on_the_way)
+            try:
+                explore(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
+            finally:
+                assert opened.robot.state is State.STOPPED
+                with pytest.raises(StoppedError):
+                    opened.robot.move_to((0, 0, 60))
+    assert not hasattr(caught.value, "__notes__"), "it was told more than once"
 
 
 def test_a_contact_while_the_arm_lowers_stops_the_arm(fake: FakeController) -> None:

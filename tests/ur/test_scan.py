@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from tests.ur.controller import FakeController, patient
 from setae import record, rig
 from setae.cli import main
 from setae.config import Config, load
-from setae.errors import ArmBoxError, ArmFrozenError
+from setae.errors import ArmBoxError, ArmFrozenError, ArmSafetyError, StageError
 from setae.experiments.scan import read, scan, simulate
 from setae.link.events import Event
 from setae.objects import ScanObject, TableScene, table_scene
@@ -58,17 +59,28 @@ def test_a_scan_on_the_arm_finds_what_one_in_the_simulator_finds(
     assert np.nanmax(np.abs(ours - theirs)) < 1.0
 
 
-def test_an_arm_that_freezes_in_a_step_stops_the_robot(fake: FakeController) -> None:
+@pytest.mark.parametrize(
+    ("happens", "kind"),
+    [
+        (FakeController.freeze, ArmFrozenError),
+        (FakeController.close, ArmFrozenError),
+        (lambda fake: fake.tell("safety 3"), ArmSafetyError),
+    ],
+    ids=["freezes", "dies", "protective stop"],
+)
+def test_an_arm_that_fails_in_a_step_stops_the_robot(
+    fake: FakeController, happens: Callable[[FakeController], None], kind: type[StageError]
+) -> None:
     config, scene = quick()
     with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
         opened.robot.enable()
 
         def on_the_way(_: Event) -> None:
             if opened.stage.moving and opened.stage.position_mm[0] > ON_THE_WAY_MM:
-                fake.freeze()
+                happens(fake)
 
         opened.robot.session.subscribe(on_the_way)
-        with pytest.raises(ArmFrozenError):
+        with pytest.raises(kind):
             scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
         assert opened.robot.state is State.STOPPED
         assert ON_THE_WAY_MM < opened.stage.position_mm[0] < config.scan.step_mm

@@ -30,6 +30,7 @@ from setae.errors import (
 )
 from setae.ur import UrStage
 from setae.ur.pose import WorldFrame, rotation
+from setae.ur.watch import Watch
 
 TIMEOUT_S = 60.0
 NEAR_MM = 0.3
@@ -192,10 +193,45 @@ def test_a_frozen_controller_is_noticed_and_told_once(fake: FakeController) -> N
         # The robot must be stopped after that, in a loop that polls the stage too.
         stage.poll(0)
         assert not stage.moving
-        with pytest.raises(ArmFrozenError, match="can't be told to stop"):
+        with pytest.raises(ArmFrozenError, match="has told nothing for"):
             stage.stop()
         with pytest.raises(ArmFrozenError):
             stage.move_to((0, 0, 0))
+
+
+def test_a_frozen_controller_is_noticed_by_a_host_that_was_busy(fake: FakeController) -> None:
+    """The state's age grew with the polls alone, by 0.05 s each at most: a host that polled every
+    0.2 s needed a second.
+    """
+    with connected(fake, state_age_s=0.5) as stage:
+        fake.freeze()
+        end_s = time.monotonic() + TIMEOUT_S
+        while stage.state_age_s <= 0.5:  # and nobody polls
+            assert time.monotonic() < end_s
+            time.sleep(0.005)
+        with pytest.raises(ArmFrozenError):
+            stage.poll(0)
+
+
+def test_a_computer_that_stalls_does_not_blame_the_controller() -> None:
+    now_s = 100.0
+    watch = Watch(lambda: 7.0, lambda: now_s)
+    watch.start()
+    watch.close()  # the thread: from here on the test looks
+    before_s = watch.unseen_s
+    now_s += 10
+    watch.look()
+    assert watch.unseen_s - before_s == pytest.approx(0.05)
+
+
+def test_a_box_that_was_never_set_is_told(fake: FakeController) -> None:
+    """The default one reaches as far as the arm, and protects nobody."""
+    default = load().ur
+    with (
+        pytest.warns(UserWarning, match="box_min_mm"),
+        connected(fake, box_min_mm=default.box_min_mm, box_max_mm=default.box_max_mm),
+    ):
+        pass
 
 
 def test_a_dead_controller_is_noticed(fake: FakeController) -> None:

@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 from cyclopts import CycloptsError
@@ -48,7 +49,10 @@ _COMMANDS = (
 def run(arguments: Sequence[str]) -> int:
     """Run one command, tell its error in one line, and return the exit code."""
     try:
-        code = _code_of(arguments)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("default", category=UserWarning, module=r"setae\.")
+            warnings.showwarning = _tell_warning
+            code = _code_of(arguments)
         if sys.stdout is not None:  # else it was closed
             sys.stdout.flush()  # what can't be written is to be told here, not at Python's end
     except SetaeError as error:
@@ -66,6 +70,11 @@ def run(arguments: Sequence[str]) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     return code if isinstance(code, int) else 0
+
+
+def _tell_warning(message: Warning | str, *_: object) -> None:
+    """In one line, and without the place in the code."""
+    tell(str(message))
 
 
 def _code_of(arguments: Sequence[str]) -> object:

@@ -38,6 +38,7 @@ from setae.experiments.reach import require_reachable
 from setae.robot import Contact, Robot
 from setae.scene import Obstacle
 from setae.stage import Stage, move_timeout_s
+from setae.stopping import stop_all
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -267,12 +268,8 @@ class _Trial:
         self._wait_for_arm(self._start_mm)
 
     def _make_safe(self, error: BaseException) -> None:
-        """Stop arm and robot. Their own failures must not hide what went wrong first."""
-        for stop in (self._stage.stop, self._robot.stop):
-            try:
-                stop()
-            except Exception as failure:
-                error.add_note(f"Stopping failed too: {failure}")
+        """Stop arm and robot."""
+        stop_all(error, self._stage.stop, self._robot.stop)
         # If the log is what failed, it can't be told there.
         with contextlib.suppress(SetaeError):
             self._emit("trial_aborted", reason=f"{type(error).__name__}: {error}".strip(": "))

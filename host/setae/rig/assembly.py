@@ -13,7 +13,7 @@ from urllib.parse import parse_qsl, urlsplit
 import setae
 from setae.arc import positive
 from setae.config import Config, load
-from setae.errors import InputError, LogError, StageError
+from setae.errors import InputError, LogError
 from setae.link.serial_transport import SerialTransport
 from setae.link.session import Pollable, Session
 from setae.link.transport import Transport
@@ -33,6 +33,7 @@ from setae.sim import (
     plugin,
 )
 from setae.stage import ManualStage, Stage
+from setae.stopping import stop_all
 from setae.ur import UrStage
 from setae_protocol.messages import PROTOCOL_VERSION
 
@@ -296,17 +297,11 @@ class Rig:
         with self._open:
             try:
                 if error is not None:
-                    self._stop_stage(error)
+                    stop_all(error, self.stage.stop)
                 self.robot.__exit__(kind, error, traceback)
             finally:
                 # After it, so that the log holds how the robot was left.
                 self._close_log(error)
-
-    def _stop_stage(self, error: BaseException) -> None:
-        try:
-            self.stage.stop()
-        except StageError as failure:
-            error.add_note(f"Stopping the arm failed too: {failure}")
 
     def _close_log(self, error: BaseException | None) -> None:
         if self._log is None:

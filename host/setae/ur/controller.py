@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from setae.config import Ur
 from setae.errors import (
+    ArmFrozenError,
     ArmModeError,
     ArmRemoteError,
     ArmSafetyError,
@@ -135,13 +136,15 @@ class Controller:
             ) from error
         self._require_remote(libraries)
         self._receive = self._call(
-            "the state", lambda: libraries.receive.RTDEReceiveInterface(
-                self._host, _STATE_HZ, _FIELDS
-            )
-        )  # fmt: skip
+            "the state",
+            lambda: libraries.receive.RTDEReceiveInterface(self._host, _STATE_HZ, _FIELDS),
+            ArmUnreachableError,
+        )
         check(self.state())
         self._control = self._call(
-            "control", lambda: libraries.control.RTDEControlInterface(self._host, _STATE_HZ)
+            "control",
+            lambda: libraries.control.RTDEControlInterface(self._host, _STATE_HZ),
+            ArmUnreachableError,
         )
         self._call("its load", self._prepare)
 
@@ -168,25 +171,29 @@ class Controller:
         )
         self._control.setWatchdog(settings.watchdog_hz)
 
-    def _call(self, what: str, call: Callable[[], Any]) -> Any:
+    def _call(
+        self, what: str, call: Callable[[], Any], kind: type[StageError] = ArmFrozenError
+    ) -> Any:
         try:
             return call()
         except RuntimeError as error:
-            raise ArmUnreachableError(
-                f"The controller at {self._host} failed at {what}: {error}."
-            ) from error
+            raise kind(f"The controller at {self._host} failed at {what}: {error}.") from error
 
     def state(self) -> ArmState:
         """What the controller last told; never waits."""
         receive = self._receive
         x, y, z, *turn = receive.getActualTCPPose()
         return ArmState(
-            timestamp_s=receive.getTimestamp(),
+            timestamp_s=self.timestamp_s(),
             pose=(1000 * x, 1000 * y, 1000 * z, *turn),
             speed_mm_s=1000 * math.hypot(*receive.getActualTCPSpeed()[:3]),
             robot_mode=receive.getRobotMode(),
             safety_mode=receive.getSafetyMode(),
         )
+
+    def timestamp_s(self) -> float:
+        """The controller's time when it last told; never waits."""
+        return float(self._receive.getTimestamp())
 
     def program_runs(self) -> bool:
         """Whether the controller still takes moves; never waits."""

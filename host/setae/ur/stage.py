@@ -10,13 +10,14 @@ from __future__ import annotations
 import contextlib
 import math
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, Self
 from urllib.parse import urlsplit
 
-from setae.config import Config
+from setae.config import Config, load
 from setae.errors import (
     ArmBoxError,
     ArmFrozenError,
@@ -27,6 +28,7 @@ from setae.errors import (
 from setae.stage import checked_move
 from setae.ur.controller import ArmState, Controller, check
 from setae.ur.pose import WorldFrame
+from setae.ur.watch import Watch
 from setae.ur.worker import Job, Worker
 
 __all__ = ["SCHEME", "UrStage"]
@@ -40,8 +42,6 @@ _NEAR_MM: Final = 0.2
 _REST_MM_S: Final = 1.0
 # At rest this long away from its target, the arm was stopped by something else.
 _STUCK_S: Final = 1.0
-# The host itself may stall; what counts is what it saw of the controller.
-_GAP_MAX_S: Final = 0.05
 
 
 @dataclass(slots=True)
@@ -90,6 +90,7 @@ class UrStage:
         self._clock = clock
         self._worker = Worker(clock)
         self._controller = Controller(host, config.ur)
+        self._watch = Watch(self._controller.timestamp_s, clock)
         try:
             connecting = self._worker.submit("connecting", self._controller.connect)
             connecting.wait(_CONNECT_TIMEOUT_S)
@@ -97,11 +98,11 @@ class UrStage:
             self._world = WorldFrame.at(self._state.pose)
             self._require_straight()
             self._require_inside(self._state.pose[:3], "Frame D is")
+            self._warn_of_no_box()
+            self._watch.start()
         except BaseException:
             self.close()
             raise
-        self._unseen_s = 0.0
-        self._polled_s = clock()
         self._move: _Move | None = None
         self._braking: Job[None] | None = None
         self._kick: Job[None] | None = None
@@ -142,6 +143,15 @@ class UrStage:
                     f" from {low_mm:g} to {high_mm:g} mm."
                 )
 
+    def _warn_of_no_box(self) -> None:
+        default, settings = load().ur, self._settings
+        if (settings.box_min_mm, settings.box_max_mm) == (default.box_min_mm, default.box_max_mm):
+            warnings.warn(
+                "The arm has no box of yours: it may carry the robot wherever it reaches, whatever"
+                " stands there. Set box_min_mm and box_max_mm in [ur] to what is free.",
+                stacklevel=2,
+            )
+
     # ---------------------------------------------------------------------------- stage
 
     @property
@@ -156,8 +166,8 @@ class UrStage:
 
     @property
     def state_age_s(self) -> float:
-        """For how long the host has watched without a new state."""
-        return self._unseen_s
+        """For how long the host has watched without a new state, also between two polls."""
+        return self._watch.unseen_s
 
     def base_mm(self, position_mm: Sequence[float]) -> tuple[float, float, float]:
         """A point of the world in the arm's base frame, as the pendant shows it, (3,)."""
@@ -209,11 +219,11 @@ class UrStage:
 
         Raises
         ------
-        StageError
-            The controller is lost: the arm's own watchdog is what stops it.
+        ArmFrozenError
+            What `poll` raised: the controller is lost, and its own watchdog is what stops the arm.
         """
         if isinstance(self._failure, ArmFrozenError):
-            raise ArmFrozenError("The arm can't be told to stop: its controller does not answer.")
+            raise self._failure
         self._move = None
         deceleration = self._config.stage.acceleration_mm_s2
         braking = self._worker.submit("a stop", lambda: self._controller.brake(deceleration))
@@ -240,17 +250,10 @@ class UrStage:
 
     def _look(self) -> None:
         now_s = self._clock()
-        state = self._controller.state()
-        gap_s, self._polled_s = now_s - self._polled_s, now_s
-        if state.timestamp_s != self._state.timestamp_s:
-            self._unseen_s = 0.0
-        else:
-            self._unseen_s += min(gap_s, _GAP_MAX_S)
-        self._state = state
-        if self._unseen_s > self._settings.state_age_s:
-            raise ArmFrozenError(
-                f"The arm's controller has told nothing for {self._unseen_s:.2f} s."
-            )
+        self._state = state = self._controller.state()
+        unseen_s = self._watch.unseen_s
+        if unseen_s > self._settings.state_age_s:
+            raise ArmFrozenError(f"The arm's controller has told nothing for {unseen_s:.2f} s.")
         check(state)
         self._feed_watchdog()
         if self._braking is not None:
@@ -303,6 +306,7 @@ class UrStage:
 
     def close(self) -> None:
         """Let go of the arm; it stays where it is. Closing twice is fine."""
+        self._watch.close()
         goodbye = self._worker.submit("goodbye", self._controller.close)
         self._worker.close()
         # A dead controller never answers; the program may end all the same.

@@ -14,6 +14,7 @@ from setae.experiments.events import Event, OnEvent
 from setae.experiments.scan.pressure import PressureWatch
 from setae.robot import Approach, Robot
 from setae.stage import Stage, move_timeout_s
+from setae.stopping import stop_all
 
 # A contact so soon after an extension's start was there before it.
 _AT_ONCE_MM = 2.5
@@ -329,12 +330,8 @@ class Steps:
         return contact.position_mm[2] - self.short_mm < _SAME_LENGTH_MM
 
     def stop(self, error: BaseException) -> None:
-        """Stop arm and robot. Their own failures must not hide what went wrong first."""
-        for stop in (self._stage.stop, self._robot.stop):
-            try:
-                stop()
-            except Exception as failure:
-                error.add_note(f"Stopping failed too: {failure}")
+        """Stop arm and robot."""
+        stop_all(error, self._stage.stop, self._robot.stop)
 
     def emit(self, name: str, **data: Any) -> None:
         """Tell of something that happened."""

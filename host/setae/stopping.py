@@ -1,0 +1,35 @@
+"""Stopping things after an error, so that it stays the one that is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+__all__ = ["stop_all"]
+
+
+def stop_all(error: BaseException, *stops: Callable[[], object]) -> None:
+    """Stop everything; a stop's own failure becomes a note on the error, unless it says no more.
+
+    Parameters
+    ----------
+    error
+        What went wrong first.
+    stops
+        Called one after the other, whatever the ones before did.
+
+    Examples
+    --------
+    >>> error = OSError("The cable is out.")
+    >>> def stop():
+    ...     raise OSError("Nobody hears the stop.")
+    >>> stop_all(error, stop, stop)
+    >>> error.__notes__
+    ['Stopping failed too: Nobody hears the stop.']
+    """
+    for stop in stops:
+        try:
+            stop()
+        except Exception as failure:
+            told = [str(error), *getattr(error, "__notes__", [])]
+            if not any(str(failure) in text for text in told):
+                error.add_note(f"Stopping failed too: {failure}")
