@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 from tests.ur.controller import FakeController, patient
+from tests.ur.turns import after, back, turn_of, turned, vector_of
 
 from setae.config import Config, load
 from setae.errors import (
@@ -79,11 +79,11 @@ def test_frame_d_is_turned_on_the_flange_by_a_rotation_vector(fake: FakeControll
     and yaw are others), the stand-in would have told the same.
     """
     d_mm, d_rotation_deg = (12.0, -7.0, 100.0), (20.0, -35.0, 60.0)
-    on_flange = Rotation.from_rotvec(d_rotation_deg, degrees=True)
+    on_flange = turn_of([math.radians(angle) for angle in d_rotation_deg])
     # Frame D hangs straight down, its x axis 25° off the base's.
-    d_in_base = Rotation.from_euler("z", 25, degrees=True) * Rotation.from_rotvec([np.pi, 0, 0])
-    flange = (d_in_base * on_flange.inv()).as_rotvec()
-    fake.tell("flange {} {} {}".format(*flange))
+    yaw, down = turn_of([0, 0, math.radians(25)]), turn_of([math.pi, 0, 0])
+    flange_rad = vector_of(after(after(yaw, down), back(on_flange)))
+    fake.tell("flange {} {} {}".format(*flange_rad))
     with connected(fake, frame_d_mm=d_mm, frame_d_rotation_deg=d_rotation_deg) as stage:
         before = fake.told()["flange"]
         stage.move_to((30, 5, -20))
@@ -91,12 +91,8 @@ def test_frame_d_is_turned_on_the_flange_by_a_rotation_vector(fake: FakeControll
         now = fake.told()["flange"]
     way_mm = 1000 * (np.array(now[:3]) - before[:3])
     # The world's x axis is D's, its z axis points up.
-    assert way_mm == pytest.approx(
-        Rotation.from_euler("z", 25, degrees=True).apply((30, 5, -20)), abs=NEAR_MM
-    )
-    assert Rotation.from_rotvec(now[3:]).as_matrix() == pytest.approx(
-        Rotation.from_rotvec(flange).as_matrix(), abs=1e-6
-    ), "the flange turned on the way"
+    assert way_mm == pytest.approx(turned(yaw, (30, 5, -20)), abs=NEAR_MM)
+    assert now[3:] == pytest.approx(flange_rad, abs=1e-6), "the flange turned on the way"
 
 
 def test_the_controller_is_told_what_the_configuration_says(fake: FakeController) -> None:
@@ -310,12 +306,21 @@ angles = st.floats(-3, 3)
 
 @given(st.tuples(angles, angles, angles))
 def test_rotation_vectors_turn_about_themselves(vector_rad: tuple[float, float, float]) -> None:
-    turned = rotation(vector_rad)
-    assert turned @ turned.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.linalg.det(turned) == pytest.approx(1)
-    assert turned @ np.array(vector_rad) == pytest.approx(np.array(vector_rad), abs=1e-9)
+    matrix = rotation(vector_rad)
+    assert matrix @ matrix.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(matrix) == pytest.approx(1)
+    assert matrix @ np.array(vector_rad) == pytest.approx(np.array(vector_rad), abs=1e-9)
     angle_rad = math.hypot(*vector_rad)
-    assert np.trace(turned) == pytest.approx(1 + 2 * math.cos(angle_rad), abs=1e-9)
+    assert np.trace(matrix) == pytest.approx(1 + 2 * math.cos(angle_rad), abs=1e-9)
+
+
+@given(st.tuples(angles, angles, angles), st.tuples(angles, angles, angles))
+def test_host_and_stand_in_turn_alike(
+    vector_rad: tuple[float, float, float], point_mm: tuple[float, float, float]
+) -> None:
+    assert rotation(vector_rad) @ np.array(point_mm) == pytest.approx(
+        turned(turn_of(vector_rad), point_mm), abs=1e-9
+    )
 
 
 @given(st.tuples(angles, angles, angles), st.tuples(angles, angles, angles))

@@ -88,6 +88,7 @@ class UrStage:
         self._config = config
         self._settings = config.ur
         self._clock = clock
+        self._failure: StageError | None = None
         self._worker = Worker(clock)
         self._controller = Controller(host, config.ur)
         self._watch = Watch(self._controller.timestamp_s, clock)
@@ -106,7 +107,6 @@ class UrStage:
         self._move: _Move | None = None
         self._braking: Job[None] | None = None
         self._kick: Job[None] | None = None
-        self._failure: StageError | None = None
 
     def _settled_state(self) -> ArmState:
         """A state in which frame D is what the configuration says: two states on."""
@@ -309,7 +309,8 @@ class UrStage:
         self._watch.close()
         goodbye = self._worker.submit("goodbye", self._controller.close)
         self._worker.close()
-        # A dead controller never answers; the program may end all the same.
+        if isinstance(self._failure, ArmFrozenError):  # it never answers
+            return
         with contextlib.suppress(StageError, RuntimeError):
             goodbye.wait(_GOODBYE_TIMEOUT_S)
 
