@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -192,23 +192,49 @@ class ScanObject:
         return _BUILDERS[self.shape](self.scale, foot, math.radians(self.yaw_deg))
 
 
-def random_object(shape: str, seed: int, *, area_mm: float = 200.0) -> ScanObject:
-    """An object of random size, place and yaw, wholly in the scanned square.
+def random_object(shape: str, seed: int, *, area_mm: float | Sequence[float] = 200.0) -> ScanObject:
+    """An object of random size, place and yaw, wholly in the scanned area.
+
+    Parameters
+    ----------
+    shape
+        One of `SHAPES`.
+    seed
+        Of size, place and yaw; the size is the same in every area.
+    area_mm
+        Sides along x and y, or one for both.
+
+    Raises
+    ------
+    InputError
+        There is no such shape, or the area is too small to have it wholly inside however turned.
 
     Examples
     --------
     >>> random_object("orange", 1) == random_object("orange", 1)
     True
+    >>> random_object("orange", 1, area_mm=(120, 90)).y_mm < 90
+    True
     """
     rng = random.Random(f"{shape} {seed}")
     scale = round(rng.uniform(SCALE_MIN, SCALE_MAX), 3)
-    free_mm = max(0.0, area_mm / 2 - ScanObject(shape=shape, scale=scale).radius_mm)
-    middle_mm = area_mm / 2
+    radius_mm = ScanObject(shape=shape, scale=scale).radius_mm
+    x_mm, y_mm = area_mm if isinstance(area_mm, Sequence) else (area_mm, area_mm)
+    if min(x_mm, y_mm) < 2 * radius_mm:
+        raise InputError(
+            f"{shape}:{seed} doesn't fit into the scanned {x_mm:g} x {y_mm:g} mm.",
+            f"Scan {math.ceil(2 * radius_mm)} mm or more along both sides, take another object, "
+            "or have one stand where you like: --scene of `setae scan`.",
+        )
+    middles_mm = []
+    for side_mm in (x_mm, y_mm):
+        free_mm = side_mm / 2 - radius_mm
+        middles_mm.append(round(side_mm / 2 + rng.uniform(-free_mm, free_mm), 1))
     return ScanObject(
         shape=shape,
         scale=scale,
-        x_mm=round(middle_mm + rng.uniform(-free_mm, free_mm), 1),
-        y_mm=round(middle_mm + rng.uniform(-free_mm, free_mm), 1),
+        x_mm=middles_mm[0],
+        y_mm=middles_mm[1],
         yaw_deg=round(rng.uniform(-180.0, 180.0), 1),
     )
 
@@ -260,8 +286,9 @@ class TableScene:
 def table_scene(config: Config, what: ScanObject | None = None) -> TableScene:
     """Place the table as a person would who brings the arm to its start.
 
-    The extended tip stays just above the table, so that only the object is touched; and the
-    arm is higher where the retracted tip would not clear the object otherwise.
+    The tip of the robot at rest, at its free length, stays just above the table: it would press
+    before anything has begun, and so only the object is touched. The arm is higher where the
+    retracted tip would not clear the object otherwise.
 
     Examples
     --------
@@ -272,7 +299,7 @@ def table_scene(config: Config, what: ScanObject | None = None) -> TableScene:
     -158.0
     """
     short_mm, _ = config.scan_lengths_mm
-    over_table_mm = _TABLE_GAP_MM - config.scan_reach_mm
+    over_table_mm = _TABLE_GAP_MM - config.rest_reach_mm
     tallest_mm = what.height_mm if what else 0.0
     tip_mm = short_mm + config.geometry.tip_offset_mm
     over_object_mm = tallest_mm + tip_mm + config.scan.clearance_mm

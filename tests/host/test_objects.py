@@ -24,6 +24,19 @@ def test_random_objects_lie_wholly_in_the_square(shape: str, seed: int) -> None:
         assert what.radius_mm - 0.1 <= middle_mm <= AREA_MM - what.radius_mm + 0.1
 
 
+def test_a_random_object_lies_in_the_area_that_is_scanned_or_is_refused() -> None:
+    # Objects stood in 200 x 200 mm, whatever was scanned: a smaller area found nothing, silently.
+    what = random_object("orange", 2, area_mm=(140.0, 100.0))
+    assert what.x_mm + what.radius_mm <= 140.1
+    assert what.y_mm + what.radius_mm <= 100.1
+    with pytest.raises(InputError, match=r"eraser:1 doesn't fit .* 60 x 60 mm\. Scan 132 mm or"):
+        random_object("eraser", 1, area_mm=60.0)
+    # As ever in the paper's square: figures hang on it.
+    assert random_object("orange", 2) == ScanObject(
+        shape="orange", scale=1.13, x_mm=119.7, y_mm=147.9, yaw_deg=-116.2
+    )
+
+
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("scale", [0.8, 1.0, 1.2])
 def test_the_robot_reaches_the_top_but_not_the_table(shape: str, scale: float) -> None:
@@ -58,8 +71,8 @@ def test_the_robot_reaches_the_top_but_not_the_table(shape: str, scale: float) -
 def test_the_table_goes_with_the_lengths_of_the_scan(
     shape: str, extended_mm: float, retracted_mm: float, clearance_mm: float
 ) -> None:
-    # The table stood below the robot's free length, whatever the scan extends to: a shorter
-    # extended_length_mm missed the foot of all objects.
+    # The table stood just below the scan's extended tip: with a shorter extended_length_mm the
+    # robot, which hangs at its free length first, pressed into it, and every scan was refused.
     config = load()
     lengths = dataclasses.replace(
         config.scan,
@@ -70,7 +83,7 @@ def test_the_table_goes_with_the_lengths_of_the_scan(
     config = dataclasses.replace(config, scan=lengths)
     scene = table_scene(config, ScanObject(shape=shape))
     assert scene.object is not None
-    over_table_mm = config.scan_reach_mm - scene.table_z_mm
+    over_table_mm = config.rest_reach_mm - scene.table_z_mm
     top_mm = scene.table_z_mm + scene.object.height_mm
     spare_mm = -(config.scan_lengths_mm[0] + config.geometry.tip_offset_mm) - top_mm
     assert over_table_mm == pytest.approx(3.0) or spare_mm == pytest.approx(clearance_mm)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,7 @@ from tests.perception.synthetic import CONFIG, REACH_MM, felt
 from setae.cli import main
 from setae.config import Config, replaced
 from setae.errors import InputError
-from setae.experiments import samples, scan
+from setae.experiments import samples, scan, study
 from setae.experiments.shapes import compare
 from setae.heightmap import HeightMap
 from setae.objects import SHAPES, ScanObject, random_object, table_scene
@@ -58,6 +60,45 @@ def test_what_was_compared_is_known_later_and_what_was_not_is_unknown(
         maps.write(path, felt(random_object(name, 150), seed=150))
         line = told(capsys, "classify", str(path), "--model", str(model)).splitlines()[1]
         assert line.split()[1] == answer
+
+
+def test_scans_without_a_shape_are_left_out_by_name(
+    given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # One scan that felt too little, or a study's bare table, ended the command for all others.
+    few = felt(random_object("orange", 1))
+    nothing = np.full_like(few.height_mm, np.nan)
+    nothing[10, 8:12] = -100.0
+    mark = np.where(np.isnan(nothing), "empty", "felt")
+    maps.write(tmp_path / "few.npz", dataclasses.replace(few, height_mm=nothing, mark=mark))
+    study.conduct(
+        study.of_options(
+            objects=["none"], seeds=1, vary=["scan.area_mm=[20,20]", "scan.step_mm=20"]
+        ).runs(),
+        tmp_path / "study",
+        workers=1,
+    )
+    model = tmp_path / "shapes.json"
+    odd = (f"orange={tmp_path / 'few.npz'}", str(tmp_path / "study"))
+    command = ("cluster", *given, *odd, "--model", str(model), "--out", str(tmp_path / "out"))
+    with pytest.raises(SystemExit) as ended:
+        main(command)
+    printed = capsys.readouterr()
+    assert ended.value.code == 0
+    assert "few is left out: The scan has 4 heights, and a shape needs 6." in printed.err
+    assert "none-0-adaptive" in printed.err
+    assert "bare table" in printed.err
+    assert re.search(rf"orange +{len(SEEDS)} +{len(SEEDS)} ", printed.out)
+    assert "few is left out" in (tmp_path / "out" / "report.html").read_text()
+    whole = given[0].partition("=")[2]
+    with pytest.raises(SystemExit) as ended:
+        main(["classify", str(tmp_path / "few.npz"), whole, "--model", str(model)])
+    printed = capsys.readouterr()
+    assert ended.value.code == 0
+    assert "few is left out" in printed.err
+    assert len(printed.out.splitlines()) == 2
+    error = told(capsys, "classify", str(tmp_path / "few.npz"), "--model", str(model), code=1)
+    assert "nothing to name" in error
 
 
 def test_scans_of_the_simulator_know_what_they_are_of(

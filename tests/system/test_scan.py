@@ -13,7 +13,7 @@ import pytest
 from setae import record, rig
 from setae.cli import main
 from setae.config import Config, load
-from setae.errors import HeightWindowError, InputError, LogError
+from setae.errors import HeightWindowError, InputError, LogError, RefusedError
 from setae.experiments.events import Event
 from setae.experiments.scan import (
     MODES,
@@ -245,6 +245,17 @@ def test_a_window_that_is_too_small_is_told_before_anything_moves() -> None:
     with pytest.raises(HeightWindowError, match="Raise the arm's start by 20 mm"):
         simulate(config, scene, on_event=events.append)
     assert not events
+
+
+def test_a_robot_that_was_in_touch_before_the_scan_is_told_to_start_higher() -> None:
+    # Its rest pressure was taken in touch. "Begin where it touches nothing" was no help: the
+    # retracted robot touched nothing.
+    config = coarse(2)
+    with rig.open("sim://", config=config, scene=TableScene(table_z_mm=-120.0)) as opened:
+        opened.robot.enable()
+        with pytest.raises(RefusedError) as refused:
+            scan(opened.robot, opened.stage)
+    assert "Raise the arm's start until the robot at its free length" in refused.value.__notes__[0]
 
 
 def test_a_contact_at_the_very_start_of_an_extension_is_flagged() -> None:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
 
-from setae import report
+from setae import record, report, rig
 from setae.cli import live_map, main
 from setae.errors import LogError
 from setae.experiments.events import Event
-from setae.experiments.scan import read
+from setae.experiments.scan import read, read_parts, scans_of
+from setae.record import Recorder
 
 
 def main_ends(code: int, *arguments: str) -> None:
@@ -55,6 +58,8 @@ def test_the_command_scans_in_two_modes_and_reports_them_side_by_side(
     [
         (("--object", "apple"), "There is no object 'apple'. Give one of lidded_container"),
         (("--object", "eraser:x"), "is no seed"),
+        # It stood outside of the area: all places were empty, and nothing said so.
+        (("--object", "eraser:1", "--area", "60"), "eraser:1 doesn't fit into the scanned 60 x 60"),
         (("--area", "wide"), "is no area. Give mm: --area 200 or --area 120x80."),
         (("--step", "0.1"), "step_mm"),
         (("--area", "2000", "--step", "1"), "Give a longer step or a smaller area"),
@@ -75,6 +80,97 @@ def test_bad_input_is_told_in_one_line(
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
+
+
+def test_one_resume_does_all_that_the_run_was_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Modes that had not begun were never done, and a second --resume said that all was complete.
+    out = tmp_path / "run"
+    with monkeypatch.context() as pressed:
+        pressed.setattr(live_map.LiveMap, "event", _ctrl_c_at("place", 2))
+        main_ends(
+            130, "scan", "--sim", "--object", "none", "--area", "40x20", "--step", "20",
+            "--mode", "paper", "--mode", "safe", "--out", str(out), "--no-report",
+        )  # fmt: skip
+    assert f"`setae scan --resume {out}` does what is left." in capsys.readouterr().err
+    # Again in the second, and so early that its log holds no scan.
+    with monkeypatch.context() as pressed:
+        pressed.setattr(rig.Rig, "record", _ctrl_c_after_second(rig.Rig.record))
+        main_ends(130, "scan", "--resume", str(out), "--no-report")
+    assert sorted(path.name for path in out.glob("*.mcap")) == [
+        "paper-2.mcap", "paper.mcap", "safe.mcap",
+    ]  # fmt: skip
+    main_ends(0, "scan", "--resume", str(out), "--no-report")
+    assert "mode safe" in capsys.readouterr().out
+    scans = scans_of(record.read(path) for path in sorted(out.glob("*.mcap")))
+    assert {read_parts(parts).mode: read_parts(parts).complete for parts in scans} == {
+        "paper": True, "safe": True,
+    }  # fmt: skip
+    main_ends(1, "scan", "--resume", str(out))
+    assert "is complete" in capsys.readouterr().err
+
+
+def _ctrl_c_at(name: str, count: int) -> Callable[[live_map.LiveMap, Event], None]:
+    left = [count]
+
+    def event(self: live_map.LiveMap, event: Event) -> None:
+        del self
+        left[0] -= event.name == name
+        if left[0] == 0:
+            raise KeyboardInterrupt
+
+    return event
+
+
+def _ctrl_c_after_second(record: Callable[..., Recorder]) -> Callable[..., Recorder]:
+    count = 0
+
+    def recorded(*arguments: Any, **options: Any) -> Recorder:
+        nonlocal count
+        count += 1
+        recorder = record(*arguments, **options)
+        if count == 2:
+            raise KeyboardInterrupt
+        return recorder
+
+    return recorded
+
+
+def test_a_start_inside_of_something_is_told_before_anything_moves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # The robot pressed 15 mm into the table; then came tare_far, and the advice to resume.
+    scene = tmp_path / "scene.toml"
+    scene.write_text("table_z_mm = -120.0\n")
+    main_ends(1, "scan", "--sim", "--scene", str(scene), "--out", str(tmp_path / "run"))
+    error = capsys.readouterr().err
+    assert "reaches 15 mm into what is below the first place" in error
+    assert "table_z_mm = -138" in error
+    assert "resume" not in error
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_scan_that_extends_less_than_the_robot_at_rest_goes_on_a_simulated_table(
+    tmp_path: Path,
+) -> None:
+    # The table was put just below the scan's extended tip, and the robot at rest pressed into it.
+    short = tmp_path / "robot.toml"
+    short.write_text("[scan]\nextended_length_mm = 60\narea_mm = [20, 20]\nstep_mm = 20\n")
+    out = tmp_path / "run"
+    main_ends(0, "scan", "--sim", "--object", "none", "--config", str(short), "--out", str(out),
+              "--no-report")  # fmt: skip
+    assert set(read(out).height_map.mark.ravel()) == {"empty"}
+
+
+def test_a_real_scan_says_that_its_height_window_is_not_checked(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    # The default height is the whole window, so the check passed whatever stood there.
+    main_ends(1, "scan", "--port", "/dev/null")
+    assert "Nobody said how tall the object is" in capsys.readouterr().err
+    main_ends(1, "scan", "--port", "/dev/null", "--tallest", "30")
+    assert "Nobody said" not in capsys.readouterr().err
 
 
 def test_the_map_grows_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:

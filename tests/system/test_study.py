@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -20,14 +21,14 @@ from setae.errors import ConfigError, InputError, SetaeError
 from setae.experiments import study
 from setae.experiments.study import Outcome, Run, conduct, perform
 
-# Nine places on the object: a tenth of a second of computing.
+# Four places of a bare table: a tenth of a second of computing.
 SMALL = ["scan.area_mm=[20,20]", "scan.step_mm=20"]
 # So far above what it steps over the retracted bristle can't be.
 TALL = "scan.clearance_mm=5,60"
 
 
 def plan(**options: object) -> study.Plan:
-    given = {"objects": ["lidded_container"], "seeds": 1, "vary": SMALL, **options}
+    given = {"objects": ["none"], "seeds": 1, "vary": SMALL, **options}
     return study.of_options(**given)  # type: ignore[arg-type]  # as a command gives them
 
 
@@ -206,6 +207,12 @@ def test_the_name_of_a_run_changes_with_all_that_it_is_made_of() -> None:
         (lambda: plan(vary=["scan.stride_mm=10"]), "stride_mm"),
         (lambda: plan(vary=["scan.step_mm=-1"]), "step_mm"),
         (lambda: plan(seeds=100_001), "too many"),
+        # These were told run by run, after the runs before them.
+        (lambda: plan(plants=["ideal", "foo"]), "no plant 'foo'"),
+        (lambda: plan(vary=["simulator.tendon.friction=0.1,9"]), r"tendon\.friction must be"),
+        (lambda: plan(vary=["simulator.tendon.fricton=0.1"]), r"Did you mean 'tendon\.friction'"),
+        # It stood outside of the area: nothing was found, and nothing said.
+        (lambda: plan(objects=["orange"]), "orange:0 doesn't fit into the scanned 20 x 20 mm"),
     ],
 )
 def test_what_can_not_be_is_told_before_anything_runs(
@@ -247,21 +254,94 @@ def test_the_command_leaves_table_and_report_and_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "study"
-    command = ["study", "--object", "lidded_container", "--seeds", "1", "--vary", SMALL[0],
+    command = ["study", "--object", "none", "--seeds", "1", "--vary", SMALL[0],
                "--vary", SMALL[1], "--vary", TALL, "--workers", "1", "--out", str(out)]  # fmt: skip
     with pytest.raises(SystemExit) as ended:
         main(command)
     printed = capsys.readouterr().out
-    assert ended.value.code == 0
+    assert ended.value.code == 3, "failed runs ended as if all was well"
     assert "1 of 2 runs done, 1 failed" in printed
     assert "Raise the arm" in printed
+    assert f"The same call with --out {out} tries what failed again." in printed
     page = (out / "report.html").read_text()
     assert "1 of 2 runs failed" in page
     assert "Raise the arm" in page
     with pytest.raises(SystemExit) as ended:
         main([*command, "--no-report"])
-    assert ended.value.code == 0
+    assert ended.value.code == 3
     assert "1 of 2 runs done, 1 failed" in capsys.readouterr().out
+
+
+def call(*arguments: str, code: int = 0) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "--object", "none", "--seeds", "1", "--vary", SMALL[0], *arguments])
+    assert ended.value.code == code
+
+
+def test_the_table_holds_the_runs_of_all_calls_into_its_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # A second call with another plan left a table of its own runs alone, beside all folders.
+    out = ("--workers", "1", "--out", str(tmp_path))
+    call("--vary", "scan.step_mm=10,20", "--no-report", *out)
+    call("--vary", "scan.step_mm=20", "--vary", "scan.order='raster'", *out)
+    assert "1 of 1 run done" in (printed := capsys.readouterr().out)
+    assert "with 2 runs of other calls" in printed
+    rows = study.read_table(tmp_path / "table.parquet")
+    assert {row["run"] for row in rows} == {path.name for path in (tmp_path / study.RUNS).iterdir()}
+    assert [(row["scan.step_mm"], row["scan.order"]) for row in rows[:1]] == [(20, "raster")]
+    assert sorted(row["scan.step_mm"] for row in rows[1:]) == [10, 20]
+    page = (tmp_path / "report.html").read_text()
+    assert "3 of 3 runs done" in page
+    assert "adaptive, area_mm [20, 20], step_mm 10<" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--workers", "0"), "Give 1 or more"),
+        (("--scheduler", "X", "--workers", "2"), "of its own"),
+    ],
+)
+def test_workers_that_can_not_be_are_told_before_anything_is_made(
+    arguments: tuple[str, ...], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # The folder and the progress bar came before the refusal.
+    call(*arguments, "--out", str(tmp_path / "study"), code=1)
+    printed = capsys.readouterr()
+    assert said in printed.err
+    assert not printed.out
+    assert not (tmp_path / "study").exists()
+
+
+def test_the_command_takes_a_scheduler(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed: Any = importlib.import_module("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://",
+        host="127.0.0.1", dashboard_address="127.0.0.1:0",
+    ) as cluster:  # fmt: skip
+        call("--vary", SMALL[1], "--no-report", "--scheduler", cluster.scheduler_address,
+             "--out", str(tmp_path))  # fmt: skip
+    assert "1 of 1 run done, 0 failed" in capsys.readouterr().out
+    monkeypatch.setattr("setae.experiments.study.conducting._CONNECT_S", 0.2)
+    call("--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "other"), code=1)
+    assert "There is no scheduler at tcp://127.0.0.1:9." in capsys.readouterr().err
+
+
+def killed_at_the_second(run: Run) -> Outcome:
+    if run.seed == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return Outcome(row={"run": run.name, "status": "done"})
+
+
+def test_a_killed_worker_costs_its_run_and_no_other(tmp_path: Path) -> None:
+    dask: Any = importlib.import_module("dask.config")
+    with dask.set({"distributed.scheduler.allowed-failures": 0}):  # it is not tried again
+        rows = conduct(plan(seeds=2).runs(), tmp_path, workers=2, task=killed_at_the_second)
+    assert [row["status"] for row in rows] == ["done", "failed"]
+    assert "KilledWorker" in rows[1]["error"]
 
 
 def test_a_missing_extra_is_told_before_anything_runs(

@@ -102,7 +102,9 @@ def test_the_dry_run_shows_the_corners(
     fake: FakeController, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
-        main(["scan", "--sim", "--stage", fake.url, "--area", "40", "--dry-run"])
+        main(
+            ["scan", "--sim", "--object", "none", "--stage", fake.url, "--area", "40", "--dry-run"]
+        )
     printed = capsys.readouterr()
     assert ended.value.code == 0, printed.err
     assert "40.0, 40.0, 0.0" in printed.out

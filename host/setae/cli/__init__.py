@@ -17,7 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run `setae` and exit with its code.
 
     0: done. 1: an error, told in one line. 2: no such command or option, or a value
-    of the wrong kind. 130: ended by Ctrl-C.
+    of the wrong kind. 3: a study has ended, and some of its runs failed. 130: ended by Ctrl-C.
     """
     try:
         # Here, because Ctrl-C may come in the second that this takes.

@@ -17,6 +17,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from setae import record, rig
+from setae.cli import tell
 from setae.cli.arm import show_arm_targets
 from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.cli.live_map import LiveMap
@@ -24,6 +25,7 @@ from setae.cli.runs import RunOptions, ended_early, make_way, say, what_is_left,
 from setae.config import Config
 from setae.errors import InputError, LogError
 from setae.experiments import scan as scans
+from setae.experiments.events import Event
 from setae.experiments.scan import Mode, ScanResult
 from setae.heightmap import TOUCHED
 from setae.objects import TableScene, UnknownScene, of_description, random_object, table_scene
@@ -76,7 +78,8 @@ def scan(
     tallest
         How far anything rises above the extended bristle's tip, in mm. The simulator knows.
     resume
-        Folder or log of a scan that ended early: what it lacks is scanned, with its settings.
+        Folder of a run that ended early: what it lacks is scanned, with its settings, modes that
+        had not begun too. Or the log of one scan.
     run
         What it writes, and the arm.
     where
@@ -95,10 +98,14 @@ def scan(
     else:
         config = _settings(where, area, step, order, tallest)
         jobs = _fresh(config, where, mode or ["paper"], object, scene)
+        if not where.simulated:
+            _warn_of_no_height(config)
         folder = cache(lambda: new_folder("scan", run.out, force=run.force))
     for job in jobs:
         scans.require_window(job.config, job.config.scan.tallest_mm)
         scans.Survey(job.config.scan)
+        if job.scene is not None:
+            scans.require_free_start(job.config, job.scene)
     if run.dry_run:
         show_arm_targets(run.stage, jobs[0].config, scans.arm_targets_mm(jobs[0].config.scan))
         return
@@ -110,13 +117,18 @@ def scan(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Job:
-    """A scan to do: how, what, and what is known of it already."""
+    """A scan to do: how, what, and what is known of it already.
+
+    `modes` are all that the run was asked for; `replaces` are logs in which no scan has begun.
+    """
 
     url: str | None
     config: Config
     mode: Mode
+    modes: tuple[Mode, ...]
     seed: int
     scene: TableScene | None
+    replaces: frozenset[Path] = frozenset()
     known: ScanResult | None = None
     part: int = 1
     arm_base_mm: tuple[float, ...] | None = None
@@ -151,6 +163,16 @@ def _settings(
     return dataclasses.replace(config, scan=dataclasses.replace(config.scan, **changes))  # type: ignore[arg-type]  # each as its key has it
 
 
+def _warn_of_no_height(config: Config) -> None:
+    """Say that the height window can't be checked: the configured height is all of it."""
+    window_mm = scans.window_mm(config)
+    if config.scan.tallest_mm >= window_mm:
+        tell(
+            f"Nobody said how tall the object is, so that it fits is not checked. It may rise "
+            f"{window_mm:g} mm above the extended bristle's tip; --tallest says how far it does."
+        )
+
+
 def _area_mm(text: str) -> tuple[float, float]:
     parts = re.split(r"[x×]", text)
     try:
@@ -176,7 +198,10 @@ def _fresh(
         config = scans.in_scene(config, place)
     elif object_ is not None or scene is not None:
         raise InputError("--object and --scene are for the simulator.", "Give --sim too.")
-    return [_Job(url=url, config=config, mode=mode, seed=where.seed, scene=place) for mode in modes]
+    job = _Job(
+        url=url, config=config, mode=modes[0], modes=tuple(modes), seed=where.seed, scene=place
+    )
+    return [dataclasses.replace(job, mode=mode) for mode in modes]
 
 
 def _object(config: Config, text: str) -> TableScene:
@@ -187,7 +212,7 @@ def _object(config: Config, text: str) -> TableScene:
         raise InputError(
             f"--object {text!r}: {seed!r} is no seed.", "Give a whole number, as in eraser:3."
         )
-    return table_scene(config, random_object(shape, int(seed or 0)))
+    return table_scene(config, random_object(shape, int(seed or 0), area_mm=config.scan.area_mm))
 
 
 def _scene(config: Config, path: Path) -> TableScene:
@@ -215,34 +240,43 @@ def _scene(config: Config, path: Path) -> TableScene:
 
 
 def _resumed(path: Path, where: Where) -> tuple[list[_Job], Callable[[], Path]]:
-    """The scan that a run left undone."""
-    logs = [path] if path.is_file() else sorted(path.glob("*.mcap"))
-    if not logs:
+    """What a run left undone: scans that ended early, then modes that had not begun."""
+    found = [path] if path.is_file() else sorted(path.glob("*.mcap"))
+    if not found:
         raise LogError(f"{path} holds no log.", "Give the folder that `setae scan` wrote.")
-    for parts in scans.scans_of(record.read(log) for log in _all_parts(logs)):
-        known = scans.read_parts(parts)
-        if not known.complete:
-            break
-    else:
-        raise InputError(f"The scan in {path} is complete.", "`setae report` makes its report.")
-    about = parts[0].metadata
-    config = parts[0].config
+    logs = [record.read(log) for log in _all_parts(found)]
+    # A run that ended while the robot was being enabled leaves a log in which no scan has begun.
+    vain = [log for log in logs if log.metadata.get("experiment") == scans.EXPERIMENT
+            and not log.events("scan_start")]  # fmt: skip
+    begun = scans.scans_of(log for log in logs if log not in vain)
+    about = logs[0].metadata
     simulated = bool(about.get("simulated"))
     if simulated and where.port is not None:
         raise InputError("That scan was simulated, so --port has no part in it.", "Leave it out.")
     plant = str(about.get("plant") or "")
     base_mm = about.get("arm_base_mm")
+    asked = tuple(about.get("modes") or ()) if path.is_dir() or not begun else ()
     job = _Job(
         url=(plant if plant.startswith("python:") else "sim://") if simulated else where.url,
-        config=config,
-        mode=known.mode,
+        config=logs[0].config,
+        mode=about["mode"],
+        modes=tuple(about.get("modes") or ()),
         seed=int(about.get("seed") or 0),
-        scene=of_description(known.scene) if simulated else None,
-        known=known,
-        part=len(parts) + 1,
+        scene=of_description(about.get("scene") or {}) if simulated else None,
+        replaces=frozenset(log.path for log in vain),
         arm_base_mm=None if base_mm is None else tuple(base_mm),
     )
-    return [job], lambda: parts[0].path.parent
+    left, modes = [], set()
+    for parts in begun:
+        known = scans.read_parts(parts)
+        modes.add(known.mode)
+        if not known.complete:
+            again = dataclasses.replace(job, mode=known.mode, known=known, part=len(parts) + 1)
+            left.append(again)
+    left += [dataclasses.replace(job, mode=mode) for mode in asked if mode not in modes]
+    if not left:
+        raise InputError(f"The scan in {path} is complete.", "`setae report` makes its report.")
+    return left, lambda: logs[0].path.parent
 
 
 def _all_parts(logs: Sequence[Path]) -> list[Path]:
@@ -263,6 +297,7 @@ class _Scanning:
         self._folder = folder
         self._run = run
         self._logs: list[Path] = []
+        self._worth_resuming = False
 
     def all(self, jobs: Sequence[_Job]) -> None:
         """Do them all."""
@@ -279,10 +314,10 @@ class _Scanning:
     def _what_is_left(self) -> list[str]:
         if not self._logs:
             return []
-        return [
-            *what_is_left(self._logs),
-            f"`setae scan --resume {self._logs[-1].parent}` goes on with the scan.",
-        ]
+        left = what_is_left(self._logs)
+        if self._worth_resuming:
+            left.append(f"`setae scan --resume {self._logs[-1].parent}` does what is left.")
+        return left
 
     def _one(self, job: _Job) -> ScanResult:
         what = "the surface" if job.scene is None else _name(job.scene)
@@ -291,13 +326,20 @@ class _Scanning:
         with LiveMap() as live, self._ready(job) as (opened, recorder):
             if job.known is not None:
                 live.known(job.known.places)
+                self._worth_resuming |= job.known_places > 0
+
+            def told(event: Event) -> None:
+                # Where not even the first place was found, it would end there again.
+                self._worth_resuming |= event.name == "place"
+                live.event(event)
+
             return scans.scan(
                 opened.robot,
                 opened.stage,
                 mode=job.mode,
                 known=job.known.places if job.known else (),
                 earlier_s=job.known.duration_s if job.known else 0.0,
-                on_event=scans.recorded(recorder, live.event),
+                on_event=scans.recorded(recorder, told),
                 arm_timeout_s=_MANUAL_TIMEOUT_S if self._by_hand(job) else None,
                 scene=None if job.scene is None else job.scene.describe()["scene"],
             )
@@ -319,13 +361,14 @@ class _Scanning:
             arm_base_mm = _arm_base_mm(opened, job)
             # Only now, so that a board that isn't there costs neither work nor a folder.
             log = self._folder() / job.name
-            if self._run.force:
+            if self._run.force or log in job.replaces:
                 make_way(log)
             if self._by_hand(job):
                 _ask_for_start(opened.robot)
             about = {
                 "experiment": scans.EXPERIMENT,
                 "mode": job.mode,
+                "modes": list(job.modes),
                 "part": job.part,
                 "arm_base_mm": arm_base_mm,
             }

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 from rich.table import Table
 
-from setae.arc import FloatArray
+from setae.cli import tell
 from setae.cli.common import Flag, app, console, new_folder
 from setae.cli.runs import say
 from setae.errors import ExtraMissingError, InputError
@@ -88,6 +87,8 @@ def cluster(
         Write the report.
     """
     found = shapes.compare(_read(run, *more))
+    for line in found.left_out:
+        tell(line)
     _print_comparison(found)
     if model is not None:
         say(f"Model: {classifier.save(model, found.model)}")
@@ -118,8 +119,13 @@ def classify(run: Path, *more: Path, model: Path) -> None:
     table = Table(box=None, padding=(0, 3, 0, 0))
     for name in ("scan", "is", "sure", "fits", "else"):
         table.add_column(name, justify="right" if name in ("sure", "fits") else "left")
+    left_out = []
     for sample in _read(run, *more):
-        answer = known.answer(_described(sample))
+        try:
+            answer = known.answer(features.described(sample.heights))
+        except InputError as error:
+            left_out.append(f"{sample.name} is left out: {error}")
+            continue
         others = sorted(answer.shares.items(), key=lambda pair: -pair[1])
         second = next(((name, share) for name, share in others if name != answer.nearest), None)
         if answer.known:
@@ -129,6 +135,12 @@ def classify(run: Path, *more: Path, model: Path) -> None:
         else:
             table.add_row(sample.name, "unknown", "", f"{answer.fit:.1%}",
                           f"likest {answer.nearest}")  # fmt: skip
+    if not table.row_count:
+        raise InputError(
+            " ".join(["There is nothing to name.", *left_out]), "Give scans of an object."
+        )
+    for line in left_out:
+        tell(line)
     console.print(table, soft_wrap=True)
 
 
@@ -138,19 +150,11 @@ def _read(*paths: Path) -> list[Sample]:
     for sample in found:
         unvisited = int((sample.heights.mark == "unvisited").sum())
         if unvisited:
-            print(
-                f"setae: {sample.name} is not whole: {unvisited} of {sample.heights.mark.size} "
-                "places were not visited.",
-                file=sys.stderr,
+            tell(
+                f"{sample.name} is not whole: {unvisited} of {sample.heights.mark.size} "
+                "places were not visited."
             )
     return found
-
-
-def _described(sample: Sample) -> FloatArray:
-    try:
-        return features.described(sample.heights)
-    except InputError as error:
-        raise InputError(f"{sample.name}: {error.problem}", error.remedy) from error
 
 
 def _free(name: str, taken: set[str]) -> str:

@@ -15,6 +15,9 @@ from setae.errors import ExtraMissingError, InputError, SetaeError
 from setae.experiments import study as studies
 from setae.wording import counted
 
+# Exit code: all runs have ended, and what they gave is kept, but some failed.
+_SOME_FAILED = 3
+
 Several = Annotated[list[str] | None, Parameter(negative="")]
 
 
@@ -34,11 +37,12 @@ def study(
     out: Path | None = None,
     force: Flag = False,
     report: bool = True,
-) -> None:
+) -> int:
     """Scan many simulated objects: every combination of objects, seeds and parameters.
 
     What came out stands in table.parquet, one line for each run. A run that fails says why in
-    its line, and the others go on. The same call with the same --out does what is left.
+    its line, and the others go on; the exit code is then 3. The same call with the same --out
+    does what is left, another one adds its runs to the table.
 
     Parameters
     ----------
@@ -84,24 +88,30 @@ def study(
             vary=vary or (), config=config, keep_logs=keep_logs,
         )  # fmt: skip
     studies.require()
+    studies.workers_for(workers, scheduler)
     goes_on = out is not None and (out / studies.RUNS).is_dir()
     folder = new_folder("study", out, force=force or goes_on)
     rows = _conduct(plan.runs(), folder, workers, scheduler)
-    table = studies.write_table(folder / "table.parquet", rows)
+    every = studies.with_earlier(rows, folder)
+    table = studies.write_table(folder / "table.parquet", every)
     failed = [row for row in rows if row["status"] != "done"]
     say(f"{len(rows) - len(failed)} of {counted(len(rows), 'run')} done, {len(failed)} failed.")
     for row in failed[:5]:
         say(f"  {row['run']}: {row['error']}")
     if len(failed) > 5:
         say(f"  … and {len(failed) - 5} more, see the table.")
-    say(f"Table: {table}")
+    if failed:
+        say(f"The same call with --out {folder} tries what failed again.")
+    earlier = f", with {counted(len(every) - len(rows), 'run')} of other calls"
+    say(f"Table: {table}{earlier if len(every) > len(rows) else ''}")
     if report:
         from setae.report import study as pages
 
         try:
-            say(f"Report: {pages.write(rows, plan.varied, folder).page}")
+            say(f"Report: {pages.write(every, plan.varied, folder).page}")
         except ExtraMissingError as error:
             console.print(f"No report: {error}", style="yellow", markup=False, soft_wrap=True)
+    return _SOME_FAILED if failed else 0
 
 
 def _conduct(

@@ -318,6 +318,11 @@ class Config:
         """Height of the extended tip in a scan, z of the world: what is lower is out of reach."""
         return -(self.scan_lengths_mm[1] + self.geometry.tip_offset_mm)
 
+    @property
+    def rest_reach_mm(self) -> float:
+        """Height of the tip of the robot at rest, at its free length, z of the world."""
+        return -(self.geometry.free_length_mm + self.geometry.tip_offset_mm)
+
     def to_toml(self) -> str:
         """The whole configuration as TOML, for logs: `loads` reads it back."""
         lines: list[str] = []

@@ -187,8 +187,8 @@ def _row(folder: Path) -> dict[str, Any]:
 
 def _of_run(folder: Path) -> Sample:
     row = _row(folder)
-    scene = None
     try:
+        what = None
         if row["object_scale"] is not None:
             what = ScanObject(
                 shape=row["object"],
@@ -197,7 +197,7 @@ def _of_run(folder: Path) -> Sample:
                 y_mm=row["object_y_mm"],
                 yaw_deg=row["object_yaw_deg"],
             )
-            scene = TableScene(table_z_mm=row["table_z_mm"], object=what)
+        scene = TableScene(table_z_mm=float(row["table_z_mm"]), object=what)
         reach_mm = float(row["reach_mm"])
     except (KeyError, TypeError, ValueError, SetaeError) as error:
         raise InputError(
@@ -206,7 +206,7 @@ def _of_run(folder: Path) -> Sample:
     plant = row.get("simulator.plant_name") or "ideal"
     return Sample(
         name=folder.name,
-        label=scene.object.shape if scene and scene.object else None,
+        label=what.shape if what else None,
         heights=maps.read(folder / MAP),
         reach_mm=reach_mm,
         scene=scene,

@@ -18,6 +18,10 @@ from setae.perception.measures import Nearness, nearness
 __all__ = ["Comparison", "compare"]
 
 
+# Fewer make no picture of clusters.
+_FEWEST = 3
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Comparison:
     """What came out.
@@ -26,6 +30,8 @@ class Comparison:
     ----------
     samples
         The scans, by label, the paper's objects first; n of them.
+    left_out
+        Of each other scan, why it isn't among them.
     labels
         What was scanned, (n,).
     vectors
@@ -45,6 +51,7 @@ class Comparison:
     """
 
     samples: tuple[Sample, ...]
+    left_out: tuple[str, ...]
     labels: tuple[str, ...]
     vectors: FloatArray
     data: FloatArray
@@ -87,51 +94,56 @@ class Comparison:
 
 
 def compare(samples: Sequence[Sample]) -> Comparison:
-    """Compare labelled scans.
+    """Compare labelled scans. Those that have no label or no shape are left out, and told.
 
     Raises
     ------
     InputError
-        There are too few, one has no label, or too few heights for a shape.
+        Too few are left.
     """
-    for sample in samples:
-        if sample.label is None:
-            raise InputError(
-                f"Nobody knows what {sample.name} is a scan of.", "Give it as NAME=PATH."
-            )
     # The paper's objects in its order, then all others.
     order = {shape: number for number, shape in enumerate(SHAPES)}
-    samples = sorted(
+    kept, vectors, data, left_out = [], [], [], []
+    for sample in sorted(
         samples, key=lambda one: (order.get(str(one.label), len(order)), str(one.label))
-    )
-    labels = [str(sample.label) for sample in samples]
-    if len(set(labels)) < 2:
-        raise InputError(
-            "There is nothing to compare.", "Give scans of two objects or more, best five of each."
-        )
-    rows = []
-    for sample in samples:
+    ):
         try:
-            rows.append(features.described(sample.heights))
+            described = _described(sample)
+            normalised = paper.normalised(sample.heights, reach_mm=sample.reach_mm)
         except InputError as error:
-            raise InputError(f"{sample.name}: {error.problem}", error.remedy) from error
-    vectors = np.stack(rows)
-    data = np.stack(
-        [paper.normalised(sample.heights, reach_mm=sample.reach_mm) for sample in samples]
-    )
+            left_out.append(f"{sample.name} is left out: {error}")
+            continue
+        kept.append(sample)
+        vectors.append(described)
+        data.append(normalised)
+    labels = [str(sample.label) for sample in kept]
+    if len(set(labels)) < 2 or len(labels) < _FEWEST:
+        raise InputError(
+            " ".join(["There is nothing to compare.", *left_out]),
+            "Give scans of two objects or more, best five of each.",
+        )
     return Comparison(
-        samples=tuple(samples),
+        samples=tuple(kept),
+        left_out=tuple(left_out),
         labels=tuple(labels),
-        vectors=vectors,
-        data=data,
-        plane=paper.embedded(data),
-        answers=tuple(classifier.leave_one_out(vectors, labels)),
-        strangers=tuple(classifier.leave_shape_out(vectors, labels)),
+        vectors=np.stack(vectors),
+        data=np.stack(data),
+        plane=paper.embedded(np.stack(data)),
+        answers=tuple(classifier.leave_one_out(np.stack(vectors), labels)),
+        strangers=tuple(classifier.leave_shape_out(np.stack(vectors), labels)),
         nearness=tuple(
             nearness(sample.heights, sample.solids, reach_mm=sample.reach_mm)
             if sample.scene
             else None
-            for sample in samples
+            for sample in kept
         ),
-        model=classifier.train(vectors, labels),
+        model=classifier.train(np.stack(vectors), labels),
     )
+
+
+def _described(sample: Sample) -> FloatArray:
+    if sample.label is None:
+        if sample.scene is not None:
+            raise InputError("It is a scan of a bare table.", "Nothing is to be told of it.")
+        raise InputError("Nobody knows what it is a scan of.", "Give it as NAME=PATH.")
+    return features.described(sample.heights)

@@ -56,8 +56,9 @@ def finding(found: Comparison) -> str:
     unknown = round(found.unknown * len(found.labels))
     return (
         f"{right} of {len(found.labels)} scans are named right by a model of all the others; "
-        f"{unknown} of {len(found.labels)} are unknown to a model that never met their shape."
-    )
+        f"{unknown} of {len(found.labels)} are unknown to a model that never met their shape. "
+        + " ".join(found.left_out)
+    ).strip()
 
 
 # ---------------------------------------------------------------------------- pictures
@@ -131,8 +132,9 @@ def trials_picture(path: Path, found: Comparison) -> Path:
                                         low_mm=low, high_mm=high)  # fmt: skip
                 answer = found.answers[index]
                 right = answer.shape == shape
-                said = clouds.title_of(answer.shape or "unknown")
-                axes.set_xlabel(f"{said}, {answer.confidence:.0%}", fontsize=8,
+                said = clouds.title_of(answer.nearest) if answer.known else "unknown"
+                sure = f", {answer.confidence:.0%}" if answer.known else ""
+                axes.set_xlabel(f"{said}{sure}", fontsize=8,
                                 color=palette.AGREES if right else palette.CONTACT)  # fmt: skip
                 if column == 0:
                     axes.set_ylabel(clouds.title_of(shape), fontsize=10, weight="bold")
@@ -239,7 +241,7 @@ def _trials(found: Comparison) -> str:
         never = "unknown" if not stranger.known else clouds.title_of(stranger.nearest)
         cells = [
             html.escape(sample.name), html.escape(clouds.title_of(label)), shown,
-            f"{answer.confidence:.1%}", html.escape(never),
+            f"{answer.confidence:.0%}" if answer.known else "–", html.escape(never),
             *(f"{value:.2f}" for value in vector),
         ]  # fmt: skip
         lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
@@ -262,7 +264,7 @@ def _csv(path: Path, found: Comparison) -> Path:
             answer, near = found.answers[index], found.nearness[index]
             writer.writerow(
                 (sample.name, found.labels[index], answer.shape or "unknown",
-                 f"{answer.confidence:.4f}", f"{answer.fit:.3g}",
+                 f"{answer.confidence:.4f}" if answer.known else "", f"{answer.fit:.3g}",
                  "yes" if found.strangers[index].known else "no",
                  *(f"{value:.4f}" for value in found.plane[index]),
                  *((f"{near.height_rms_mm:.4f}", f"{near.chamfer_mm:.4f}") if near else ("", "")),

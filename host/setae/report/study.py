@@ -53,6 +53,8 @@ def write(
         Matplotlib isn't installed.
     """
     folder = Path(out)
+    # Runs of other calls in the same folder may vary other keys: a name with a dot is one.
+    varied = list(dict.fromkeys([*varied, *(key for row in rows for key in row if "." in key)]))
     drawn: list[Path] = []
     with files.writing(folder):
         pictures = files.pictures_of(folder)
@@ -66,7 +68,7 @@ def write(
 
 def _case(row: Row, varied: Sequence[str]) -> str:
     """Name of a run's combination, without object and seed."""
-    changes = [f"{_short(key)} {_shown(row.get(key))}" for key in varied]
+    changes = [f"{_short(key)} {_shown(row[key])}" for key in varied if row.get(key) is not None]
     return ", ".join([str(row["mode"]), *changes])
 
 

@@ -12,6 +12,7 @@ from setae.rig.assembly import (
     open,  # noqa: A004  # rig.open() is what it does
     simulator_parameters,
     simulator_version,
+    try_simulator,
 )
 from setae.rig.ports import PortInfo, find_port, ports
 from setae.sim import plants
@@ -27,4 +28,5 @@ __all__ = [
     "ports",
     "simulator_parameters",
     "simulator_version",
+    "try_simulator",
 ]

@@ -230,6 +230,19 @@ def _world(config: Config, scene: Scene, seed: int, foreign: str | None = None) 
     return world
 
 
+def try_simulator(config: Config, seed: int = 0) -> None:
+    """Make a simulated robot, and drop it: so that what it can't have is told beforehand.
+
+    Raises
+    ------
+    InputError
+        There is no such plant or parameter, or a value is out of range.
+    SimulatorMissingError
+        The simulator isn't part of this installation.
+    """
+    _world(config, tube_scene(config), seed).close()
+
+
 def simulator_version() -> str:
     """Say that the compiled simulator is there, by stepping one world.
 

@@ -33,7 +33,7 @@ from setae.experiments.scan.run import (
     true_surface,
 )
 from setae.experiments.scan.survey import Place, Survey
-from setae.experiments.scan.window import require_window, window_mm
+from setae.experiments.scan.window import require_free_start, require_window, window_mm
 
 __all__ = [
     "EXPERIMENT",
@@ -49,6 +49,7 @@ __all__ = [
     "read_parts",
     "record_true_surface",
     "recorded",
+    "require_free_start",
     "require_window",
     "scan",
     "scans_of",

@@ -20,7 +20,7 @@ from setae.experiments.reach import require_reachable
 from setae.experiments.scan import adaptive, cycles
 from setae.experiments.scan.steps import Feeling, Steps, contact_data
 from setae.experiments.scan.survey import Cell, Place, Survey
-from setae.experiments.scan.window import require_window
+from setae.experiments.scan.window import require_free_start, require_window
 from setae.heightmap import HeightMap
 from setae.objects import TableScene
 from setae.record import Recorder
@@ -295,10 +295,19 @@ def simulate(
         The simulated robot; None: the configured one.
     log
         Where to write a log, if at all; it must not exist.
+
+    Raises
+    ------
+    HeightWindowError
+        The robot at rest would press into the scene, or as in `scan`.
+    SetaeError
+        As in `scan`.
     """
     if plant is not None:
         config = dataclasses.replace(config, plant=plant)
     config = in_scene(config, scene)
+    require_window(config, config.scan.tallest_mm)
+    require_free_start(config, scene)
     with rig.open("sim://", config=config, seed=seed, scene=scene) as opened:
         told = on_event
         if log is not None:

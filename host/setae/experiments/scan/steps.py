@@ -283,9 +283,17 @@ class Steps:
         """After a refused baseline: too little pressure for a contact, too much for none."""
         if refusal.reason == _IN_TOUCH and self.short:
             x_mm, y_mm, _ = self.position_mm
+            hint = "See that the bristle hangs free there, and begin where it touches nothing."
+            if self._is_here(0.0, 0.0):
+                # Its pressure at rest was measured before the robot retracted.
+                hint = (
+                    "The bristle was in touch already when the board was connected, or it is "
+                    "caught now. Raise the arm's start until the robot at its free length touches "
+                    "nothing, then scan anew."
+                )
             refusal.add_note(
                 f"That was {x_mm:.0f}, {y_mm:.0f} mm from the first place, with the robot short. "
-                "See that the bristle hangs free there, and begin where it touches nothing."
+                + hint
             )
         if refusal.reason != _IN_TOUCH or self.short:
             raise refusal

@@ -1,12 +1,16 @@
-"""How tall a thing may be that the retracted bristle is carried over."""
+"""Where the robot starts: over nothing that it touches, above all that it is carried over."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from setae import kinematics, workspace
 from setae.config import Config
 from setae.errors import HeightWindowError
+from setae.objects import TableScene, table_scene
+from setae.perception import surface
 
-__all__ = ["require_window", "window_mm"]
+__all__ = ["require_free_start", "require_window", "window_mm"]
 
 
 def window_mm(config: Config) -> float:
@@ -47,4 +51,25 @@ def require_window(config: Config, tallest_mm: float) -> None:
             "to spare.",
             f"Raise the arm's start by {too_much_mm:.3g} mm, or give a smaller clearance_mm in "
             "[scan].",
+        )
+
+
+def require_free_start(config: Config, scene: TableScene) -> None:
+    """Refuse a simulated scene into which the robot at rest would press at the first place.
+
+    Its bristle would be in touch when its pressure at rest is measured, and blind from then on.
+
+    Raises
+    ------
+    HeightWindowError
+        It would.
+    """
+    top_mm = float(surface.height_mm(scene.solids, *np.zeros((2, 1)))[0])
+    deep_mm = top_mm - config.rest_reach_mm
+    if deep_mm > 0:
+        raise HeightWindowError(
+            f"The robot at rest reaches {deep_mm:.3g} mm into what is below the first place: its "
+            f"tip is at z = {config.rest_reach_mm:g} mm, and the scene rises to {top_mm:g} mm.",
+            f"Put everything there lower: table_z_mm = {table_scene(config).table_z_mm:g}, and no "
+            "object at the first place.",
         )

@@ -6,10 +6,10 @@ what came out, and `table` makes one table of it.
 
 from __future__ import annotations
 
-from setae.experiments.study.conducting import RUNS, Row, conduct, require
+from setae.experiments.study.conducting import RUNS, Row, conduct, require, workers_for
 from setae.experiments.study.one import MAP, Outcome, perform
 from setae.experiments.study.plan import Plan, Run, load, of_options
-from setae.experiments.study.table import read_table, write_table
+from setae.experiments.study.table import read_table, with_earlier, write_table
 
 __all__ = [
     "MAP",
@@ -24,5 +24,7 @@ __all__ = [
     "perform",
     "read_table",
     "require",
+    "with_earlier",
+    "workers_for",
     "write_table",
 ]

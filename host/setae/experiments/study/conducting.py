@@ -23,13 +23,13 @@ from setae.errors import InputError, SetaeError
 from setae.experiments.study.one import LOG, Outcome, perform
 from setae.experiments.study.plan import Run
 
-__all__ = ["RUNS", "Row", "conduct", "finished", "require"]
+__all__ = ["LINE", "RUNS", "Row", "conduct", "finished", "require", "workers_for"]
 
 Row: TypeAlias = Mapping[str, Any]
 """A run's line of the table."""
 
 RUNS: Final = "runs"
-_ROW: Final = "row.json"
+LINE: Final = "row.json"
 _CONNECT_S: Final = 10
 # Workers on this machine come out of one process that imports all this once, while this one still
 # imports its own; each for itself would take longer to begin than a scan takes.
@@ -55,6 +55,22 @@ def require() -> None:
     """
     for module in ("distributed", "pyarrow", "scipy", "threadpoolctl"):
         extras.load(module, "study", "A study")
+
+
+def workers_for(workers: int | None, scheduler: str | None) -> int:
+    """How many processes on this machine do the runs, if no scheduler is given.
+
+    Raises
+    ------
+    InputError
+        Workers and a scheduler are both given, or the number of workers is no good.
+    """
+    if scheduler is not None and workers is not None:
+        raise InputError("A scheduler has workers of its own.", "Give it, or --workers.")
+    workers = workers if workers is not None else len(os.sched_getaffinity(0))
+    if workers < 1:
+        raise InputError(f"{workers} workers do nothing.", "Give 1 or more.")
+    return workers
 
 
 def conduct(
@@ -98,11 +114,7 @@ def conduct(
     ExtraMissingError
         dask.distributed isn't installed.
     """
-    if scheduler is not None and workers is not None:
-        raise InputError("A scheduler has workers of its own.", "Give it, or --workers.")
-    workers = workers if workers is not None else len(os.sched_getaffinity(0))
-    if workers < 1:
-        raise InputError(f"{workers} workers do nothing.", "Give 1 or more.")
+    workers = workers_for(workers, scheduler)
     rows = {run.name: row for run in runs if (row := finished(folder, run)) is not None}
     told = on_row or _ignore
     for row in rows.values():
@@ -126,7 +138,7 @@ def finished(folder: Path, run: Run) -> Row | None:
     if run.keep_log and not (folder / RUNS / run.name / LOG).is_file():
         return None
     try:
-        row = json.loads((folder / RUNS / run.name / _ROW).read_text(encoding="utf-8"))
+        row = json.loads((folder / RUNS / run.name / LINE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return row if isinstance(row, dict) and row.get("status") == "done" else None
@@ -136,12 +148,12 @@ def _keep(folder: Path, outcome: Outcome) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # An earlier line, of the run without its log, would vouch for files half written.
-        (folder / _ROW).unlink(missing_ok=True)
+        (folder / LINE).unlink(missing_ok=True)
         for name, content in outcome.files.items():
             (folder / name).write_bytes(content)
-        unfinished = folder / f"{_ROW}.part"
+        unfinished = folder / f"{LINE}.part"
         unfinished.write_text(json.dumps(outcome.row, indent=1) + "\n", encoding="utf-8")
-        unfinished.replace(folder / _ROW)
+        unfinished.replace(folder / LINE)
     except OSError as error:
         raise SetaeError(
             f"{folder} can't be written to: {error.strerror or error}.",

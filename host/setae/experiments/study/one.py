@@ -80,7 +80,9 @@ def perform(run: Run) -> Outcome:
 
 def _scanned(run: Run) -> Outcome:
     config = loads(run.config, source=run.name)
-    what = None if run.object == EMPTY else random_object(run.object, run.seed)
+    what = None
+    if run.object != EMPTY:
+        what = random_object(run.object, run.seed, area_mm=config.scan.area_mm)
     scene = table_scene(config, what)
     threads = extras.load("threadpoolctl", "study", "A study")
     # As many runs at once as there are cores: their matrices are small, and need one each.

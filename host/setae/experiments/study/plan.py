@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from setae import config as robot
+from setae import rig
 from setae.config import Config
 from setae.errors import ConfigError, InputError
 from setae.experiments.scan import MODES, Mode
-from setae.objects import SHAPES
+from setae.objects import SHAPES, random_object
 
 __all__ = ["EMPTY", "Plan", "Run", "load", "of_options"]
 
@@ -81,7 +82,8 @@ class Plan:
     Raises
     ------
     InputError
-        Something is empty, doubled, or has no such name, or the runs are too many.
+        Something is empty, doubled, or has no such name, an object doesn't fit into an area, the
+        simulator can't have a value, or the runs are too many.
     ConfigError
         There is no such key, or it can't have such a value.
     """
@@ -110,9 +112,14 @@ class Plan:
         bad = [seed for seed in self.seeds if isinstance(seed, bool) or not isinstance(seed, int)]
         if bad or min(self.seeds) < 0:
             raise InputError("study: a seed is a whole number from 0.", "Give such seeds.")
-        # Before anything runs, every value has been tried.
-        for changes in self._combinations():
-            robot.replaced(self.config, changes)
+        # Before anything runs, every name and value has been tried.
+        configs = [robot.replaced(self.config, changes) for changes in self._combinations()]
+        for config in {(one.plant, one.simulator): one for one in configs}.values():
+            rig.try_simulator(config, min(self.seeds))
+        for area_mm in {config.scan.area_mm for config in configs}:
+            for shape, seed in itertools.product(self.objects, self.seeds):
+                if shape != EMPTY:
+                    random_object(shape, seed, area_mm=area_mm)
 
     @property
     def varied(self) -> tuple[str, ...]:

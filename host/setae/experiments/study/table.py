@@ -9,9 +9,31 @@ from typing import Any
 
 from setae import extras
 from setae.errors import InputError
-from setae.experiments.study.conducting import Row
+from setae.experiments.study.conducting import LINE, RUNS, Row
 
-__all__ = ["read_table", "write_table"]
+__all__ = ["read_table", "with_earlier", "write_table"]
+
+
+def with_earlier(rows: Sequence[Row], folder: Path) -> list[Row]:
+    """Lines of a call's runs, then those that other calls have left in the study's folder.
+
+    Parameters
+    ----------
+    rows
+        Of this call's runs.
+    folder
+        The study's.
+    """
+    ours = {row["run"] for row in rows}
+    earlier: list[Row] = []
+    for path in sorted((folder / RUNS).glob(f"*/{LINE}")):
+        try:
+            row = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue  # half of a line belongs to no run that is whole
+        if isinstance(row, dict) and {"run", "status"} <= row.keys() and row["run"] not in ours:
+            earlier.append(row)
+    return [*rows, *earlier]
 
 
 def write_table(path: Path, rows: Sequence[Row]) -> Path:
