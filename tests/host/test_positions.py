@@ -126,6 +126,8 @@ def test_a_bad_table_is_told_with_its_place_and_what_to_do(
         ("px_per_mm = 8\norigin_px = [1, 2]\nleft = '+X'", ["'left'"]),
         ("px_per_mm = 8\norigin_px = [1, 2]\n[view.X]", ["no group", "X"]),
         ("px_per_mm 8", ["TOML"]),
+        # The marker was passed over.
+        ("px_per_mm = 1\nmarker_mm = 15\nmarker_px = 10\norigin_px = [1, 2]", ["given twice"]),
     ],
 )
 def test_a_bad_frame_is_told_with_the_key_and_what_to_do(

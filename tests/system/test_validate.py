@@ -204,6 +204,8 @@ def test_a_real_robot_waits_for_pictures_and_is_measured_by_a_file(
         (("--sim", "--noise-mm", "-1"), "noise"),
         (("--positions", "a.csv", "--model", "paper", "--model", "taut"), "one --model"),
         (("--positions", "a.csv", "--causes"), "--causes is for driving"),  # was passed over
+        (("--positions", "a.csv", "--sim"), "--sim is for driving"),  # these two were, too
+        (("--positions", "a.csv", "--plant", "paper_like"), "--plant is for driving"),
     ],
 )
 def test_contradictions_are_told_in_one_line_before_anything_moves(
@@ -332,3 +334,21 @@ def test_a_pose_without_a_solution_is_no_measurement(
     assert label.startswith("+X")
     for text in (printed, (out / "report.html").read_text()):
         assert f"had no solution there: {label} (residual 0.5)" in " ".join(text.split())
+
+
+def test_a_frame_that_fits_better_mirrored_is_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "mirrored.csv"
+    rows = [
+        f"{target.label},{-x},{y},{z}"
+        for target in paper_targets(load())
+        for x, y, z in [target.position_mm]
+        if target.group == "+X"
+    ]
+    table.write_text("\n".join(["target,x_mm,y_mm,z_mm", *rows]))
+    code, printed, errors = run(
+        capsys, "--positions", str(table), "--out", str(tmp_path / "run"), "--no-report"
+    )
+    assert code == 0, errors
+    assert "Is the frame right? The 34 positions of +X lie on the other side" in printed

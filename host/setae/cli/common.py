@@ -90,6 +90,15 @@ class Where:
         """Whether the robot is a simulated one, as also `--port avr://...` names."""
         return self.sim or self.plugin is not None or "://" in (self.port or "")
 
+    @property
+    def named_robot(self) -> dict[str, bool]:
+        """Whether each option that names a robot to drive is given."""
+        return {
+            "--sim": self.sim or self.plugin is not None,
+            "--plant": self.plant is not None,
+            "--port": self.port is not None,
+        }
+
     def load(self) -> Config:
         """The configuration."""
         config = load(self.config)

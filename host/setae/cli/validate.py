@@ -18,8 +18,8 @@ from setae.cli.runs import ended_early, later, make_way, say, what_is_left, writ
 from setae.config import Config
 from setae.errors import InputError
 from setae.experiments import causes as why
+from setae.experiments import frames, runs, view
 from setae.experiments import positions as measurements
-from setae.experiments import runs, view
 from setae.experiments.events import Event, OnEvent
 from setae.experiments.targets import Target, choose, paper_targets
 from setae.experiments.validate import Noise, measured, validate
@@ -106,7 +106,7 @@ def validate_command(
     noise = Noise(sd_mm=noise_mm, seed=noise_seed)
     if positions:
         drives = {"--targets": targets is not None, "--noise-mm": noise.sd_mm != 0,
-                  "--causes": causes, "--resume": resume}  # fmt: skip
+                  "--causes": causes, "--resume": resume, **where.named_robot}  # fmt: skip
         if given := [name for name, is_given in drives.items() if is_given]:
             raise InputError(
                 f"{given[0]} is for driving, and --positions drives nothing.", "Leave one out."
@@ -340,6 +340,8 @@ def _import(
         make_way(log)
     measured(log, poses, config, model=models[0], files=[Path(file).name for file in files])
     say(f"{len(poses)} of {len(every)} targets measured.")
+    for doubt in frames.doubts(poses):
+        say(f"Is the frame right? {doubt}")
     return folder
 
 

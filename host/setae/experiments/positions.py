@@ -116,6 +116,8 @@ def read(
     name_column = next((columns[name] for name in _NAMES if name in columns), None)
     order = [target for target in targets if group is None or target.group == group]
     body = [(line, row) for line, row in rows[1:] if any(text.strip() for text in row)]
+    if not body:
+        raise InputError(f"{path} is empty below its line of names.", "Give a line a pose.")
     by_order = _in_order(body, name_column, targets)
     if by_order and len(body) != len(order):
         what = f"group {group}" if group else "the run"

@@ -31,8 +31,10 @@ __all__ = ["Frame", "View", "load"]
 
 _AXES: Final = {f"{sign}{name}": (place, float(f"{sign}1"))
                 for place, name in enumerate("XYZ") for sign in "+-"}  # fmt: skip
+_PX_PER_MM: Final = "px_per_mm"
+_MARKER: Final = ("marker_mm", "marker_px")
 _KEYS: Final = (
-    "px_per_mm", "marker_mm", "marker_px", "origin_px", "right", "down", "rotation_deg",
+    _PX_PER_MM, *_MARKER, "origin_px", "right", "down", "rotation_deg",
 )  # fmt: skip
 
 
@@ -104,7 +106,13 @@ class Frame:
         InputError
             A key is missing or wrong; the message names it.
         """
-        table = {**self.common, **self.special.get(group, {})}
+        special = self.special.get(group, {})
+        table = {**self.common, **special}
+        # A scale of its own takes the place of the common one, however each is given.
+        if _PX_PER_MM in special:
+            table = {key: table[key] for key in table if key in special or key not in _MARKER}
+        elif any(name in special for name in _MARKER):
+            table.pop(_PX_PER_MM, None)
         return _view(table, f"{self.path}, pictures of {group}", group)
 
     def position_mm(self, group: str, x_px: float, y_px: float) -> FloatArray:
@@ -164,8 +172,13 @@ def _view(table: Mapping[str, Any], where: str, group: str) -> View:
 
 
 def _scale(table: Mapping[str, Any], where: str) -> float:
-    if "px_per_mm" in table:
-        scale = _number(table, "px_per_mm", where)
+    if _PX_PER_MM in table and any(name in table for name in _MARKER):
+        raise InputError(
+            f"{where}: the scale is given twice, as px_per_mm and by a marker.",
+            "Leave px_per_mm out, or marker_mm and marker_px.",
+        )
+    if _PX_PER_MM in table:
+        scale = _number(table, _PX_PER_MM, where)
     elif "marker_mm" in table and "marker_px" in table:
         marker_mm = _number(table, "marker_mm", where)
         scale = _number(table, "marker_px", where) / marker_mm if marker_mm > 0 else -1.0

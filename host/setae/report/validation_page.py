@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from setae.experiments import frames
 from setae.experiments.accuracy import OVERALL, Spread, Summary, by_group
 from setae.experiments.runs import Run
 from setae.report import extras, palette, paper, solving, template
@@ -164,6 +165,8 @@ def _origin(runs: Sequence[Run]) -> str:
                     _CUT.format(len(run.cut_mm), max(run.cut_mm.values())),
                 )
             )
+        if not run.simulated:
+            rows += [("is the frame right?", doubt) for doubt in frames.doubts(run.poses)]
         if run.unsolved:
             rows.append(("", run.unsolved_text))
         if not run.complete:
