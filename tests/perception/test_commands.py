@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import re
 from pathlib import Path
@@ -54,12 +55,24 @@ def test_what_was_compared_is_known_later_and_what_was_not_is_unknown(
     assert "Named right 100%" in printed
     page = (out / "report.html").read_text()
     assert "12 of 12 scans are named right" in page
-    assert (out / "trials.csv").read_text().count("\n") == 13
+    trials = list(csv.DictReader((out / "trials.csv").read_text().splitlines()))
+    assert len(trials) == 12
     for name, answer in (("orange", "orange"), ("coil", "unknown")):
         path = tmp_path / f"new-{name}.npz"
         maps.write(path, felt(random_object(name, 150), seed=150))
         line = told(capsys, "classify", str(path), "--model", str(model)).splitlines()[1]
         assert line.split()[1] == answer
+
+
+def test_unknown_has_no_confidence(given: list[str], tmp_path: Path) -> None:
+    # "unknown, 100 %": the confidence in the nearest shape stood beside it.
+    one_coil = [word for word in given if not word.startswith("coil=")]
+    one_coil.append(next(word for word in given if word.startswith("coil=")))
+    pages.write(compare(samples.read_all(one_coil)), tmp_path)
+    trials = list(csv.DictReader((tmp_path / "trials.csv").read_text().splitlines()))
+    assert [row["confidence"] for row in trials if row["named"] == "unknown"] == [""]
+    assert all(0.5 < float(row["confidence"]) < 1 for row in trials if row["named"] != "unknown")
+    assert ">unknown</span></td><td>–</td>" in (tmp_path / "report.html").read_text()
 
 
 def test_scans_without_a_shape_are_left_out_by_name(

@@ -129,8 +129,8 @@ def classify(run: Path, *more: Path, model: Path) -> None:
         others = sorted(answer.shares.items(), key=lambda pair: -pair[1])
         second = next(((name, share) for name, share in others if name != answer.nearest), None)
         if answer.known:
-            other = f"{second[0]} {second[1]:.0%}" if second and second[1] >= 0.005 else ""
-            table.add_row(sample.name, answer.nearest, f"{answer.confidence:.1%}",
+            other = f"{second[0]} {second[1]:.0%}" if second and second[1] >= 0.05 else ""
+            table.add_row(sample.name, answer.nearest, f"{answer.confidence:.0%}",
                           f"{answer.fit:.0%}", other)  # fmt: skip
         else:
             table.add_row(sample.name, "unknown", "", f"{answer.fit:.1%}",
