@@ -23,15 +23,17 @@ _READY_TIMEOUT_S = 30
 _addresses = (f"127.7.{os.getpid() % 250 + 1}.{last}" for last in itertools.count(1))
 
 
+def boxed(settings: Ur) -> Ur:
+    """With a box around where the stand-in stands."""
+    return dataclasses.replace(
+        settings, box_min_mm=(-850.0, -850.0, 50.0), box_max_mm=(850.0, 850.0, 1050.0)
+    )
+
+
 def patient(settings: Ur) -> Ur:
     """For a busy machine, on which the stand-in may get no turn for a while; with a box."""
     return dataclasses.replace(
-        settings,
-        state_age_s=5.0,
-        command_deadline_s=20.0,
-        watchdog_hz=0.5,
-        box_min_mm=(-850.0, -850.0, 50.0),
-        box_max_mm=(850.0, 850.0, 1050.0),
+        boxed(settings), state_age_s=3.0, command_deadline_s=20.0, watchdog_hz=0.5
     )
 
 

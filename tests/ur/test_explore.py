@@ -13,7 +13,6 @@ from setae.config import Config, load
 from setae.errors import (
     ArmBoxError,
     ArmFrozenError,
-    ArmModeError,
     ArmSafetyError,
     StageError,
     StoppedError,
@@ -71,9 +70,8 @@ def test_a_level_outside_of_the_box_is_told_before_anything_moves(fake: FakeCont
         (FakeController.freeze, ArmFrozenError, "Nobody knows whether the arm still moves"),
         (FakeController.close, ArmFrozenError, "Nobody knows whether the arm still moves"),
         (lambda fake: fake.tell("safety 3"), ArmSafetyError, "protective stop"),
-        (lambda fake: fake.tell("mode 5"), ArmModeError, "has its brakes on"),
     ],
-    ids=["freezes", "dies", "protective stop", "brakes"],
+    ids=["freezes", "dies", "protective stop"],
 )
 def test_an_arm_that_fails_while_it_lowers_stops_the_robot(
     fake: FakeController,

@@ -109,3 +109,6 @@ def test_the_dry_run_shows_the_corners(
     assert ended.value.code == 0, printed.err
     assert "40.0, 40.0, 0.0" in printed.out
     assert "Nothing was moved" in printed.out
+    assert printed.err.count("Set box_min_mm and box_max_mm") == 1, (
+        "the default box protects nobody"
+    )

@@ -76,6 +76,11 @@ class UrStage:
         Frame D doesn't hang straight down.
     ExtraMissingError
         ur-rtde isn't installed.
+
+    Warns
+    -----
+    UserWarning
+        The box is the default one.
     """
 
     def __init__(
