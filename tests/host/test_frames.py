@@ -19,7 +19,8 @@ TARGETS = paper_targets(load())
 def poses(targets: tuple[Target, ...], by: tuple[float, float, float], sd_mm: float) -> list[Pose]:
     """What a robot with errors of its own shows where the frame multiplies by something."""
     errs = np.random.default_rng(1)
-    return [Pose(t, by * (np.array(t.position_mm) + errs.normal(0, sd_mm, 3))) for t in targets]
+    scale = np.array(by)
+    return [Pose(t, scale * (np.array(t.position_mm) + errs.normal(0, sd_mm, 3))) for t in targets]
 
 
 def test_a_good_frame_is_not_doubted() -> None:

@@ -53,6 +53,7 @@ def test_two_models_side_by_side_with_tables_and_one_report(
     )  # fmt: skip
     assert code == 0, errors
     assert "4.32±2.73" in printed  # the paper's own, beside
+    assert "These are 12 of 145 targets: not comparable" in printed
     found = runs_in(out)
     assert [one.model for one in found] == ["paper", "taut"]
     assert all(one.complete and one.simulated for one in found)
@@ -172,7 +173,7 @@ def test_a_real_robot_waits_for_pictures_and_is_measured_by_a_file(
             "--accept-jump",
         )  # fmt: skip
     assert code == 0, errors
-    assert "5 of 5: -Y z45 b80" in printed
+    assert "5 of 5: -Y z50 b30" in printed
     assert "none measured" in printed
     assert not (out / "report.html").exists()
     driven = choose(paper_targets(load()), 5)
@@ -321,7 +322,7 @@ def test_a_pose_without_a_solution_is_no_measurement(
 
     def unsolved_towards_x(world: World) -> Truth:
         found = truth(world)
-        bent = found.backbone_mm[-1][0] > 10
+        bent = found.backbone_mm[-1][0] > 5
         return dataclasses.replace(found, plant_residual=0.5) if bent else found
 
     monkeypatch.setattr(World, "truth", unsolved_towards_x)
@@ -344,11 +345,11 @@ def test_a_frame_that_fits_better_mirrored_is_asked_about(
         f"{target.label},{-x},{y},{z}"
         for target in paper_targets(load())
         for x, y, z in [target.position_mm]
-        if target.group == "+X"
+        if target.group == "+X" and x < 29  # beyond, it is refused
     ]
     table.write_text("\n".join(["target,x_mm,y_mm,z_mm", *rows]))
     code, printed, errors = run(
         capsys, "--positions", str(table), "--out", str(tmp_path / "run"), "--no-report"
     )
     assert code == 0, errors
-    assert "Is the frame right? The 34 positions of +X lie on the other side" in printed
+    assert "Is the frame right? The 30 positions of +X lie on the other side" in printed

@@ -39,6 +39,11 @@ def print_runs(found: Sequence[runs.Run]) -> None:
             say(f"Model {run.model}: {counted(len(run.poses), 'target')}, {run.source}.")
             say("Errors in mm, mean±SD; in the bending plane, but for the last column:")
             console.print(_table(run.poses))
+            if len(run.poses) < len(run.targets):
+                say(
+                    f"These are {len(run.poses)} of {len(run.targets)} targets: not comparable "
+                    "with the paper's figures, which are of all."
+                )
         if run.unsolved:
             say(f"Model {run.model}: {run.unsolved_text}.")
         elif not run.poses:

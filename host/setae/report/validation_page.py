@@ -71,7 +71,9 @@ def finding(runs: Sequence[Run]) -> str:
         parts.append(f"{_spread(whole.in_plane)} mm with the model {run.model}")
     count = f"{len(runs[0].poses)} of {counted(len(runs[0].targets), 'target')}"
     text = f"Mean error in the bending plane, over {count}: {'; '.join(parts)}. "
-    text += f"The paper’s robot: {_spread(theirs)} mm."
+    text += f"The paper’s robot: {_spread(theirs)} mm"
+    some = len(runs[0].poses) < len(runs[0].targets)
+    text += ", on all targets: not comparable with some of them." if some else "."
     run = runs[0]
     holds = run.held([pose.target for pose in run.poses])
     if 0 < holds.sum() < len(holds):
