@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from tests.ur.controller import FakeController, patient
 
-from setae import rig
+from setae import record, rig
+from setae.cli import main
 from setae.config import Config, load
 from setae.errors import (
     ArmBoxError,
@@ -32,19 +34,32 @@ def quick(step_mm: float = 40.0) -> Config:
     return dataclasses.replace(config, explore=settings, ur=patient(config.ur))
 
 
-def test_a_trial_finds_the_cube_and_brings_the_arm_back(fake: FakeController) -> None:
-    config = quick()
-    obstacle = Obstacle(below_tip_mm=35)
-    with rig.open(
-        "sim://", config=config, scene=tube_scene(config, obstacle), stage=fake.url
-    ) as opened:
-        opened.robot.enable()
-        result = explore(opened.robot, opened.stage, obstacle=obstacle, arm_timeout_s=ARM_TIMEOUT_S)
-        assert [touch.alpha_deg for touch in result.contacts] == [0.0]
-        assert result.descent_mm == pytest.approx(40, abs=0.3)
-        assert opened.stage.position_mm == pytest.approx((0, 0, 0), abs=0.3)
-        assert opened.world is not None
+def test_a_trial_by_the_command_finds_the_cube_and_brings_the_arm_back(
+    fake: FakeController, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start = fake.told()["flange"]
+    robot, out = tmp_path / "robot.toml", tmp_path / "run"
+    robot.write_text(quick().to_toml())
+    monkeypatch.setattr("setae.stage._SLACK_S", ARM_TIMEOUT_S)
+    with pytest.raises(SystemExit) as ended:
+        main(["explore", "--sim", "--stage", fake.url, "--config", str(robot), "--obstacle", "35",
+              "--out", str(out)])  # fmt: skip
+    assert ended.value.code == 0
+    assert (out / "report.html").is_file()
+    log = record.read(out / "trial-1.mcap")
+    (end,) = log.events("trial_end")
+    assert [touch["alpha_deg"] for touch in end.data["contacts"]] == [0.0]
+    assert end.data["descent_mm"] == pytest.approx(40, abs=0.3)
+    assert fake.told()["flange"] == pytest.approx(start, abs=0.3e-3), "it is back"
+
+
+def test_the_world_s_arm_goes_where_the_arm_goes(fake: FakeController) -> None:
+    with rig.open("sim://", config=quick(), stage=fake.url) as opened:
+        opened.stage.move_to((0.0, 0.0, -5.0))
+        opened.robot.wait(lambda: not opened.stage.moving, timeout_s=ARM_TIMEOUT_S, what="the arm")
         opened.robot.session.run_for(1_000_000)
+        assert opened.stage.position_mm == pytest.approx((0, 0, -5), abs=0.3)
+        assert opened.world is not None
         assert opened.world.arm_mm == pytest.approx(opened.stage.position_mm, abs=0.01)
 
 
