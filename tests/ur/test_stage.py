@@ -28,6 +28,7 @@ from setae.errors import (
     InputError,
     StageError,
 )
+from setae.experiments.reach import require_reachable
 from setae.ur import UrStage
 from setae.ur.pose import WorldFrame, rotation
 from setae.ur.watch import Watch
@@ -136,6 +137,16 @@ def test_targets_outside_the_box_are_refused_before_anything_moves(fake: FakeCon
         assert not stage.moving
         stage.move_to((0, 0, -40))
         poll_until(stage, lambda: not stage.moving)
+
+
+def test_the_targets_of_an_experiment_count_from_where_the_arm_stands(fake: FakeController) -> None:
+    """A scan's corners were checked from the world's origin, and gone to from the arm's start."""
+    with connected(fake, box_min_mm=(-850.0, -850.0, 450.0)) as stage:
+        require_reachable(stage, [(0, 0, -40)])
+        stage.move_to((0, 0, -20))
+        poll_until(stage, lambda: not stage.moving)
+        with pytest.raises(ArmBoxError, match=r"z = 4[34]\d\.\d mm"):
+            require_reachable(stage, [(0, 0, 0), (0, 0, -40)])
 
 
 def test_a_start_outside_the_box_is_refused(fake: FakeController) -> None:

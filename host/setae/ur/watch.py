@@ -9,6 +9,7 @@ from typing import Final
 __all__ = ["Watch"]
 
 _PERIOD_S: Final = 0.005
+_END_TIMEOUT_S: Final = 1.0
 # The host's computer itself may stall, and then it hears nothing either: what counts is for
 # how long somebody looked.
 _GAP_MAX_S: Final = 0.05
@@ -49,7 +50,7 @@ class Watch:
         """End; closing twice is fine, and so is closing what was never started."""
         self._ended.set()
         if self._thread.is_alive():
-            self._thread.join()
+            self._thread.join(_END_TIMEOUT_S)
 
     def look(self) -> None:
         """Look once; the thread does."""
