@@ -26,6 +26,7 @@ from setae.experiments.events import Event, OnEvent
 from setae.experiments.targets import Target, commanded_lengths_mm
 from setae.record import Recorder
 from setae.robot import Robot
+from setae.stopping import stop_all
 
 __all__ = ["Measure", "Noise", "measured", "validate"]
 
@@ -123,10 +124,7 @@ def validate(
                 poses.append(Pose(target, np.asarray(position, dtype=float)))
             robot.move_lengths(straight)
     except BaseException as error:
-        try:
-            robot.stop()
-        except Exception as failure:
-            error.add_note(f"Stopping failed too: {failure}")
+        stop_all(error, robot.stop)
         # If the log is what failed, it can't be told there.
         with contextlib.suppress(SetaeError):
             emit("validate_aborted", reason=f"{type(error).__name__}: {error}".strip(": "))
