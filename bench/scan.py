@@ -10,12 +10,14 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 from bench.figure import Figure
 
 from setae import record
 from setae.config import load
 from setae.experiments.scan import Mode, simulate
-from setae.experiments.scan.quality import Quality, quality, surface_of
+from setae.experiments.scan.quality import Quality, agreement, quality, surface_of
+from setae.heightmap import HeightMap
 from setae.objects import SHAPES, random_object, table_scene
 from setae.perception.measures import EDGE_MM, EDGE_STEP_MM
 
@@ -30,6 +32,7 @@ class Run:
     robot_s: float
     wall_s: float
     cpu_s: float
+    heights: HeightMap
     quality: Quality
 
 
@@ -49,6 +52,7 @@ def run(shape: str, mode: Mode) -> Run:
         robot_s=result.duration_s,
         wall_s=wall_s,
         cpu_s=cpu_s,
+        heights=result.height_map,
         quality=quality(result, surface, config.scan_reach_mm),
     )
 
@@ -106,4 +110,47 @@ def scan_heights() -> Iterable[Figure]:
         )
 
 
-FIGURES = {"scan_times": scan_times, "scan_heights": scan_heights}
+def scan_edges() -> Iterable[Figure]:
+    """How ragged edges come out, in both modes, and how like the maps of both modes are."""
+    modes: tuple[tuple[str, Mode], ...] = (
+        ("scan_edge_rms_mm", "paper"),
+        ("scan_adaptive_edge_rms_mm", "adaptive"),
+    )
+    for name, mode in modes:
+        found = {shape: run(shape, mode) for shape in SHAPES}
+        places = sum(one.quality.edge_places for one in found.values())
+        square_mm2 = sum(
+            one.quality.edge_places * one.quality.edge_rms_mm**2
+            for one in found.values()
+            if one.quality.edge_places
+        )
+        shapes = "; ".join(f"{shape} {_edges(one)}" for shape, one in found.items())
+        yield Figure(
+            name,
+            round(math.sqrt(square_mm2 / places), 2),
+            "mm",
+            f"mode {mode}: heights against the simulator's true surface at edges, five objects,"
+            f" seed {OBJECT_SEED}, {places} places with a height; each shape's error in mm, and"
+            f" its places slipped/double/lost: {shapes}",
+        )
+    both = [(run(shape, "adaptive").heights, run(shape, "paper").heights) for shape in SHAPES]
+    touched = [[np.isfinite(one.height_mm) for one in pair] for pair in both]
+    shared = sum(int((one & other).sum()) for one, other in touched)
+    either = sum(int((one | other).sum()) for one, other in touched)
+    yield Figure(
+        "scan_adaptive_agreement",
+        round(float(np.mean([agreement(*pair) for pair in both])), 3),
+        "1",
+        "share of the places where the adaptive mode and the paper's cycle both found something,"
+        f" or both nothing; mean of the five objects, seed {OBJECT_SEED}; both found something at"
+        f" {shared} of the {either} places where either did",
+    )
+
+
+def _edges(one: Run) -> str:
+    counts = (int((one.heights.mark == mark).sum()) for mark in ("slipped", "double", "lost"))
+    rms = f"{one.quality.edge_rms_mm:.1f}" if one.quality.edge_places else "-"
+    return f"{rms}, {'/'.join(str(count) for count in counts)}"
+
+
+FIGURES = {"scan_times": scan_times, "scan_heights": scan_heights, "scan_edges": scan_edges}

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from setae.experiments.scan.quality import agreement
 from setae.heightmap import TOUCHED
 from setae.report import extras, palette, solving, template
 from setae.report.scan_pictures import cloud, top_mm
@@ -125,15 +126,13 @@ def _table(scans: Sequence[Scan]) -> str:
                 else ["–", "–"]
             )
         if paper is not None and len(scans) > 1:
-            cells.append("–" if scan is paper else f"{_agreement(scan, paper):.1%}")
+            cells.append("–" if scan is paper else f"{_like(scan, paper):.1%}")
         lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
     return "".join([*lines, "</tbody></table>"])
 
 
-def _agreement(scan: Scan, paper: Scan) -> float:
-    """Share of places where both found something, or both nothing."""
-    ours, theirs = (np.isfinite(one.result.height_map.height_mm) for one in (scan, paper))
-    return float((ours == theirs).mean()) if ours.shape == theirs.shape else float("nan")
+def _like(scan: Scan, paper: Scan) -> float:
+    return agreement(scan.result.height_map, paper.result.height_map)
 
 
 def _origin(scans: Sequence[Scan]) -> str:

@@ -13,7 +13,7 @@ from setae.heightmap import HeightMap
 from setae.perception.measures import EDGE_MM, EDGE_STEP_MM
 from setae.record import Log
 
-__all__ = ["Quality", "Surface", "quality", "surface_of"]
+__all__ = ["Quality", "Surface", "agreement", "quality", "surface_of"]
 
 # Less than that above the extended tip is not felt for certain.
 _GRAZED_MM: Final = 3.0
@@ -71,8 +71,8 @@ class Quality:
         Of height errors away from edges; NaN where there are none.
     places
         How many places that is.
-    edge_rms_mm
-        Of height errors at edges.
+    edge_rms_mm, edge_places
+        Of height errors at edges; how many places there have a height.
     missed, invented
         Places away from edges where something is but no height was found, and the reverse.
     """
@@ -81,6 +81,7 @@ class Quality:
     bias_mm: float
     places: int
     edge_rms_mm: float
+    edge_places: int
     missed: int
     invented: int
 
@@ -115,9 +116,16 @@ def quality(result: ScanResult, surface: Surface, lowest_mm: float) -> Quality:
         bias_mm=float(inner.mean()) if len(inner) else float("nan"),
         places=len(inner),
         edge_rms_mm=_rms(outer),
+        edge_places=len(outer),
         missed=int((known & ~has & ~edge & (true_mm > lowest_mm + _GRAZED_MM)).sum()),
         invented=int((has & ~there & ~edge).sum()),
     )
+
+
+def agreement(one: HeightMap, other: HeightMap) -> float:
+    """Share of places where both maps found something, or both nothing; NaN for other grids."""
+    ours, theirs = np.isfinite(one.height_mm), np.isfinite(other.height_mm)
+    return float((ours == theirs).mean()) if ours.shape == theirs.shape else float("nan")
 
 
 def _rms(values: NDArray[np.float64]) -> float:
