@@ -31,7 +31,7 @@ class LiveMap:
         # Not with the module: all reports come with it. Nor later: a scan would wait for it.
         from setae.report import palette
 
-        self._heat = palette.heat
+        self._palette = palette
         self._places: dict[tuple[int, int], Place] = {}
         self._columns = self._rows = 0
         self._total = 1
@@ -108,7 +108,8 @@ class LiveMap:
                 else:
                     share = (place.height_mm - low) / max(high - low, 1.0)
                     sign = _SIGNS.get(place.mark, "+ " if place.mark == "inferred" else "  ")
-                    text.append(sign, style=f"black on {self._heat(share)}")
+                    colour = self._palette.at(self._palette.HEIGHTS, share)
+                    text.append(sign, style=f"{'black' if share > 0.4 else 'white'} on {colour}")
             text.append("\n")
         return text
 

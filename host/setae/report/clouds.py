@@ -9,13 +9,14 @@ import numpy as np
 from setae.arc import FloatArray
 from setae.heightmap import HeightMap
 from setae.perception import maps
-from setae.report import extras, palette
+from setae.report import palette, style
 
-__all__ = ["SHAPE_COLOURS", "draw_cloud", "draw_map", "title_of"]
+__all__ = ["SHAPE_COLOURS", "about_middle", "draw_cloud", "draw_map", "title_of"]
 
 SHAPE_COLOURS: Final = ("#2b5c8a", "#e07b1a", "#12888a", "#8a3fa0", "#d4213d", "#7a8b1f", "#41566b")
 """One for each shape, in their order; more shapes begin anew."""
 
+_RULER_MM = 50.0
 _EYE_DEG = (28.0, -62.0)
 
 
@@ -24,7 +25,7 @@ def title_of(name: str) -> str:
     return name.replace("_", " ")
 
 
-def draw_cloud(axes: Any, heights: HeightMap) -> None:
+def draw_cloud(axes: Any, heights: HeightMap, most_mm: float) -> None:
     """Draw a map's points about their mean, coloured by distance to it as in the paper's figure 5.
 
     Parameters
@@ -33,29 +34,40 @@ def draw_cloud(axes: Any, heights: HeightMap) -> None:
         Three-dimensional.
     heights
         The scan.
+    most_mm
+        Distance with the scale's last colour.
     """
-    points = maps.known(heights)
-    if len(points):
-        points = points - points.mean(axis=0)
-        away = np.linalg.norm(points, axis=1)
-        axes.scatter(
-            *points.T, c=away, cmap=_map(), s=11, depthshade=False, linewidths=0,
-            vmin=0, vmax=max(float(away.max()), 1.0),
-        )  # fmt: skip
-    half = max(50.0, float(np.abs(points[:, :2]).max())) if len(points) else 50.0
+    points, away = about_middle(heights)
+    axes.scatter(
+        *points.T, c=away, cmap=style.colours(palette.AMOUNTS), s=11, depthshade=False,
+        linewidths=0, vmin=0, vmax=most_mm,
+    )  # fmt: skip
+    half = max(60.0, float(np.abs(points[:, :2]).max())) if len(points) else 60.0
     rise = max(25.0, float(np.abs(points[:, 2]).max())) if len(points) else 25.0
     axes.set(xlim=(-half, half), ylim=(-half, half), zlim=(-rise, rise))
-    axes.set_box_aspect((1, 1, rise / half), zoom=1.1)
+    axes.set_box_aspect((1, 1, rise / half), zoom=1.08)
     axes.view_init(elev=_EYE_DEG[0], azim=_EYE_DEG[1])
-    axes.tick_params(labelsize=7, pad=-3)
-    axes.locator_params(nbins=4)
+    axes.tick_params(labelsize=7, pad=-2)
+    axes.set(xticks=(-50, 0, 50), yticks=(-50, 0, 50), zticks=(-20, 0, 20))
+    axes.set_xlabel("x (mm)", labelpad=-2)
+    axes.set_ylabel("y (mm)", labelpad=-2)
+    axes.set_zlabel("z (mm)", labelpad=-4)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((1, 1, 1, 1))
         axis._axinfo["grid"].update(color=palette.GRID, linewidth=0.6)
+        axis.label.set_size(8.5)
+
+
+def about_middle(heights: HeightMap) -> tuple[FloatArray, FloatArray]:
+    """Points of a map about their mean, (n, 3), and their distances to it, (n,)."""
+    points = maps.known(heights)
+    if len(points):
+        points = points - points.mean(axis=0)
+    return points, np.linalg.norm(points, axis=1)
 
 
 def draw_map(axes: Any, heights: HeightMap, *, low_mm: float, high_mm: float) -> Any:
-    """Draw a height map from above; places without a height stay pale, doubtful ones get a dot.
+    """Draw a height map from above; places without a height stay grey, doubtful ones get a dot.
 
     Parameters
     ----------
@@ -71,12 +83,12 @@ def draw_map(axes: Any, heights: HeightMap, *, low_mm: float, high_mm: float) ->
     object
         What a colour bar needs.
     """
-    axes.set_facecolor(palette.PANEL)
+    axes.set_facecolor(palette.UNKNOWN)
     drawn = axes.imshow(
         heights.height_mm,
         origin="lower",
         extent=_extent(heights),
-        cmap=_map(),
+        cmap=style.colours(palette.HEIGHTS),
         vmin=low_mm,
         vmax=high_mm,
         interpolation="nearest",
@@ -84,6 +96,12 @@ def draw_map(axes: Any, heights: HeightMap, *, low_mm: float, high_mm: float) ->
     rows, columns = np.nonzero(np.isin(heights.mark, ("slipped", "double", "lost")))
     axes.scatter(heights.x_mm[columns], heights.y_mm[rows], s=3, color=palette.INK, linewidths=0)
     axes.set(xticks=[], yticks=[])
+    left, right, bottom, top = _extent(heights)
+    start_mm, at_mm = left + 0.05 * (right - left), bottom + 0.06 * (top - bottom)
+    axes.plot([start_mm, start_mm + _RULER_MM], [at_mm, at_mm], color=palette.MUTED, lw=1.6,
+              solid_capstyle="butt")  # fmt: skip
+    axes.text(start_mm, at_mm + 0.02 * (top - bottom), f"{_RULER_MM:g} mm", fontsize=6,
+              color=palette.MUTED, va="bottom")  # fmt: skip
     for side in axes.spines.values():
         side.set(visible=True, color=palette.GRID)
     return drawn
@@ -99,8 +117,3 @@ def _extent(heights: HeightMap) -> tuple[float, float, float, float]:
 
 def _half(places_mm: FloatArray) -> float:
     return float(np.median(np.diff(places_mm))) / 2 if len(places_mm) > 1 else 0.5
-
-
-def _map() -> Any:
-    colours = extras.load("matplotlib.colors")
-    return colours.LinearSegmentedColormap.from_list("heat", palette.HEAT)

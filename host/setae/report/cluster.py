@@ -11,7 +11,7 @@ import numpy as np
 
 from setae.experiments.shapes import Comparison
 from setae.perception.features import FEATURES
-from setae.report import clouds, files, palette, style, template
+from setae.report import clouds, extras, files, palette, style, template
 from setae.report.files import Report
 
 __all__ = ["clouds_picture", "finding", "trials_picture", "write"]
@@ -67,26 +67,36 @@ def finding(found: Comparison) -> str:
 def clouds_picture(path: Path, found: Comparison) -> Path:
     """Draw one cloud of each shape, and all trials in the plane of t-SNE."""
     shapes = found.shapes
+    first = [found.samples[found.labels.index(shape)] for shape in shapes]
+    away = [clouds.about_middle(sample.heights)[1] for sample in first]
+    most_mm = max([1.0, *(float(one.max()) for one in away if len(one))])
     columns = 3 if len(shapes) <= 5 else 4
     rows = -(-(len(shapes) + 1) // columns)
     with style.used():
-        figure = style.figure(4.1 * columns, 3.55 * rows + 0.75)
-        top = 1 - 0.75 / (3.55 * rows + 0.75)
-        figure.text(0.02, 1 - 0.28 * (1 - top), "What the bristle felt of each object",
-                    fontsize=16, weight="bold", va="top")  # fmt: skip
-        figure.text(0.02, 1 - 0.72 * (1 - top), _note(found), fontsize=10, color=palette.MUTED,
-                    va="top")  # fmt: skip
-        grid = figure.add_gridspec(rows, columns, left=0.02, right=0.97, bottom=0.085,
-                                   top=top - 0.05, wspace=0.12, hspace=0.2)  # fmt: skip
+        width, height = 4.1 * columns, 3.5 * rows + 1.6
+        figure = style.figure(width, height)
+        top = style.headline(
+            figure, "What the bristle felt of each object",
+            f"{_origin(found)}. (a) and on: the first of the scans of each, about the middle of "
+            f"its points. Last: all {len(found.samples)} scans.",
+        )  # fmt: skip
+        grid = figure.add_gridspec(rows, columns, left=0.01, right=0.985, bottom=0.85 / height,
+                                   top=top - 0.32 / height, wspace=0.1, hspace=0.16)  # fmt: skip
         places = [grid[divmod(index, columns)] for index in range(rows * columns)]
-        for index, (shape, place) in enumerate(zip(shapes, places, strict=False)):
-            axes = figure.add_subplot(place, projection="3d")
-            sample = found.samples[found.labels.index(shape)]
-            clouds.draw_cloud(axes, sample.heights)
-            axes.set_title(f"({chr(97 + index)}) {clouds.title_of(shape)}", pad=2)
+        for index, (shape, sample) in enumerate(zip(shapes, first, strict=True)):
+            axes = figure.add_subplot(places[index], projection="3d")
+            clouds.draw_cloud(axes, sample.heights, most_mm)
+            axes.set_title(f"({chr(97 + index)}) {clouds.title_of(shape)}", pad=0)
         axes = figure.add_subplot(places[len(shapes)])
         _draw_plane(axes, found)
         axes.set_title(f"({chr(97 + len(shapes))}) t-SNE of the paper's data", pad=8)
+        scale = extras.load("matplotlib.cm").ScalarMappable(cmap=style.colours(palette.AMOUNTS))
+        scale.set_clim(0.0, most_mm)
+        bar = figure.add_axes((0.06, 0.6 / height, 1.4 / columns - 0.06, 0.15 / height))
+        figure.colorbar(scale, cax=bar, orientation="horizontal").set_label(
+            "distance from the middle of the points (mm)", fontsize=9.5
+        )
+        bar.tick_params(labelsize=8.5)
         style.save(figure, path)
     return path
 
@@ -99,11 +109,11 @@ def _draw_plane(axes: Any, found: Comparison) -> None:
             *some.T, s=42, linewidths=0.8, edgecolors="white", label=clouds.title_of(shape),
             color=clouds.SHAPE_COLOURS[index % len(clouds.SHAPE_COLOURS)],
         )  # fmt: skip
-    axes.set(xticks=[], yticks=[])
+    axes.set(xticks=[], yticks=[], xlabel="t-SNE 1", ylabel="t-SNE 2")
     axes.margins(0.12)
     for side in axes.spines.values():
         side.set(visible=True, color=palette.GRID)
-    axes.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.01),
+    axes.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.08),
                 ncols=3, handletextpad=0.1, columnspacing=0.8)  # fmt: skip
 
 
@@ -112,46 +122,55 @@ def trials_picture(path: Path, found: Comparison) -> Path:
     shapes = found.shapes
     by_shape = {s: [i for i, label in enumerate(found.labels) if label == s] for s in shapes}
     columns = min(_TRIALS_SHOWN, max(len(some) for some in by_shape.values()))
+    base_mm, above = _base(found)
     heights = np.concatenate([sample.heights.height_mm.ravel() for sample in found.samples])
     low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
     with style.used():
-        width, height = 1.75 * columns + 1.9, 2.0 * len(shapes) + 1.15
+        width, height = 1.75 * columns + 1.9, 2.0 * len(shapes) + 1.9
         figure = style.figure(width, height)
-        figure.text(0.25 / width, 1 - 0.2 / height, "Height maps from above", fontsize=15,
-                    weight="bold", va="top")  # fmt: skip
-        figure.text(0.25 / width, 1 - 0.55 / height, "Below each: what a model of all the others "
-                    "says, and how sure it is.", fontsize=9.5, color=palette.MUTED,
-                    va="top")  # fmt: skip
+        top = style.headline(
+            figure, "Height maps from above",
+            f"{_origin(found)}. Below each: what a model of all the others says, and how sure it "
+            "is. Grey: nothing within reach. Dots: doubtful (slipped, double or lost contacts).",
+        )  # fmt: skip
         grid = figure.add_gridspec(len(shapes), columns, left=0.45 / width,
                                    right=1 - 1.15 / width, bottom=0.3 / height,
-                                   top=1 - 0.95 / height, wspace=0.1, hspace=0.3)  # fmt: skip
+                                   top=top - 0.12 / height, wspace=0.1, hspace=0.3)  # fmt: skip
         for row, (shape, some) in enumerate(by_shape.items()):
             for column, index in enumerate(some[:columns]):
                 axes = figure.add_subplot(grid[row, column])
                 drawn = clouds.draw_map(axes, found.samples[index].heights,
                                         low_mm=low, high_mm=high)  # fmt: skip
                 answer = found.answers[index]
+                said = "unknown"
+                if answer.known:
+                    said = f"{clouds.title_of(answer.nearest)}, {answer.confidence:.0%}"
                 right = answer.shape == shape
-                said = clouds.title_of(answer.nearest) if answer.known else "unknown"
-                sure = f", {answer.confidence:.0%}" if answer.known else ""
-                axes.set_xlabel(f"{said}{sure}", fontsize=8,
+                axes.set_xlabel(said, fontsize=8,
                                 color=palette.AGREES if right else palette.CONTACT)  # fmt: skip
                 if column == 0:
                     axes.set_ylabel(clouds.title_of(shape), fontsize=10, weight="bold")
-        scale = figure.add_axes((1 - 0.85 / width, 0.3 / height, 0.16 / width, 1 - 1.25 / height))
-        figure.colorbar(drawn, cax=scale).set_label("height, from the arm's start (mm)", fontsize=9)
+        scale = figure.add_axes((1 - 0.85 / width, 0.3 / height, 0.16 / width, top - 0.42 / height))
+        bar = figure.colorbar(drawn, cax=scale)
+        bar.set_label(f"height {above} (mm)", fontsize=9)
+        bar.formatter = lambda value, _: f"{value - base_mm:.0f}"
         scale.tick_params(labelsize=8)
         style.save(figure, path)
     return path
 
 
-def _note(found: Comparison) -> str:
+def _base(found: Comparison) -> tuple[float, str]:
+    """Where heights are told from, z of the world, and in words: the table if it is known."""
+    tables = {sample.scene.table_z_mm if sample.scene else None for sample in found.samples}
+    if len(tables) == 1 and (table_mm := tables.pop()) is not None:
+        return table_mm, "above the table"
+    return 0.0, "from the arm's start"
+
+
+def _origin(found: Comparison) -> str:
     origins = dict.fromkeys(sample.origin for sample in found.samples)
     text = "; ".join(origins) if len(origins) <= 2 else f"{len(origins)} kinds of scans"
-    return (
-        f"First trial of each, about its middle, in mm; red is far from it. {len(found.samples)} "
-        f"scans, {text}."
-    )
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 # -------------------------------------------------------------------------------- page

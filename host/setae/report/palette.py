@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 INK = "#1f2933"
 MUTED = "#66727f"
 GRID = "#e4e9ee"
@@ -19,8 +21,19 @@ CONTACT = "#d4213d"
 CLEAR = "#cfe0ec"
 PRESSURE = "#2b5c8a"
 AGREES = "#1f7a4d"
-HEAT = ("#2b7bba", "#58a892", "#e0b43c", "#e07b1a", "#d4213d")
-"""From small to large, evenly spaced."""
+UNKNOWN = "#e4e9ee"
+"""Where a map knows nothing."""
+
+HEIGHTS = ("#2d2f73", "#31639c", "#2c9093", "#6fb36a", "#e3c33a")
+"""From low to high, in every picture and on every page; also from early to late.
+
+Like `AMOUNTS` even in lightness (CIELAB L* 23 to 79), so that the order stays without colour too:
+neighbours stay 17 and 10 ΔE apart at least for who sees no red or no green.
+"""
+AMOUNTS = ("#e8bd4f", "#e8913a", "#d95f36", "#ad2b47", "#641642")
+"""From near or right to far or wrong: distances and errors, which are never negative."""
+DIFFERENCES = ("#1f4e8c", "#6fa3cf", "#fbf6d5", "#e08a5b", "#a3172f")
+"""From too low over none to too high; none is yellowish, to differ from `UNKNOWN`."""
 
 
 def direction(alpha_deg: float) -> str:
@@ -31,17 +44,22 @@ def direction(alpha_deg: float) -> str:
     return f"#{round(red * 255):02x}{round(green * 255):02x}{round(blue * 255):02x}"
 
 
-def heat(share: float) -> str:
-    """Return the colour at a place on the scale `HEAT`, which runs from 0 to 1.
+def at(scale: Sequence[str], share: float) -> str:
+    """Return the colour at a place on a scale, which runs from 0 to 1.
 
     Examples
     --------
-    >>> heat(0.0), heat(0.5), heat(7.0)
-    ('#2b7bba', '#e0b43c', '#d4213d')
+    >>> at(HEIGHTS, 0.0), at(HEIGHTS, 0.5), at(HEIGHTS, 7.0)
+    ('#2d2f73', '#2c9093', '#e3c33a')
     """
-    place = min(max(share, 0.0), 1.0) * (len(HEAT) - 1)
-    low = min(int(place), len(HEAT) - 2)
-    return mix(HEAT[low], HEAT[low + 1], place - low)
+    place = min(max(share, 0.0), 1.0) * (len(scale) - 1)
+    low = min(int(place), len(scale) - 2)
+    return mix(scale[low], scale[low + 1], place - low)
+
+
+def stops(scale: Sequence[str]) -> list[list[float | str]]:
+    """Return a scale as Plotly takes it: pairs of a place from 0 to 1 and a colour."""
+    return [[index / (len(scale) - 1), colour] for index, colour in enumerate(scale)]
 
 
 def mix(colour: str, other: str, share: float) -> str:

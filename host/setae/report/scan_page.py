@@ -18,7 +18,7 @@ from setae.wording import counted
 
 _PICTURES: Final = {
     "heights": "Height maps from above, with flags, the true surface and the errors",
-    "clouds": "The clouds of points, coloured by their distance from the robot",
+    "clouds": "The clouds of points, coloured by their height",
     "paths": "The arm's way from above, coloured by time",
     "pressure": "Pressure of the bristle over the scan and around the first touch",
 }
@@ -167,10 +167,7 @@ def _data(scans: Sequence[Scan]) -> dict[str, Any]:
             "ink": palette.INK,
             "grid": palette.GRID,
             "contact": palette.CONTACT,
-            "heat": [
-                [index / (len(palette.HEAT) - 1), colour]
-                for index, colour in enumerate(reversed(palette.HEAT))
-            ],
+            "heights": palette.stops(palette.HEIGHTS),
         },
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from setae.experiments.scan import ScanResult, read_parts, scans_of
 from setae.experiments.scan.quality import Quality, Surface, quality, surface_of
 from setae.record import Log
 
-__all__ = ["Scan", "Trace", "origin_note", "read_scans"]
+__all__ = ["Scan", "Trace", "object_note", "origin_note", "read_scans"]
 
 _ORDER = ("paper", "safe", "adaptive")
 
@@ -47,7 +47,8 @@ class Scan:
     path
         Where the arm was: x, y from the first place, (n, 2).
     pressure
-        The bristle's, in hPa, (n,).
+        The bristle's and the baseline that the board compares it with, in hPa, (n, 2); without
+        a baseline where nobody watches.
     place_s
         When each place of `result` became known, (n,).
     step_contacts
@@ -97,6 +98,14 @@ def read_scans(logs: Iterable[Log]) -> tuple[Scan, ...]:
     return tuple(sorted(scans, key=lambda scan: _ORDER.index(scan.result.mode)))
 
 
+def object_note(scans: Sequence[Scan]) -> str:
+    """What was scanned, as far as it is known: simulated objects are."""
+    what = scans[0].result.scene.get("object")
+    if not isinstance(what, Mapping):
+        return ""
+    return f"{str(what['shape']).replace('_', ' ')}, size {what['scale']:.2g}"
+
+
 def origin_note(scans: Sequence[Scan]) -> str:
     """Where the data is from, for a picture's corner."""
     first = scans[0].logs[0]
@@ -116,12 +125,12 @@ def _scan(parts: Sequence[Log]) -> Scan:
     for log in parts:
         start = log.events("scan_start")[0]
         offset_s = begin_s - start.time_us / 1e6
-        for topic, field, name in (
-            ("/stage", "position_mm", "path"),
-            ("/pressure", "pressure_hpa", "pressure"),
+        for topic, name, values in (
+            ("/stage", "path", log.array("/stage", "position_mm")),
+            ("/pressure", "pressure", _watched(log)),
         ):
             times_us = log.times_us(topic)
-            values = log.array(topic, field).reshape(len(times_us), -1)
+            values = values.reshape(len(times_us), -1)
             order = np.argsort(times_us, kind="stable")
             stamped = np.column_stack([times_us[order] / 1e6 + offset_s, values[order]])
             traces[name].append(stamped[times_us[order] >= start.time_us])
@@ -141,13 +150,19 @@ def _scan(parts: Sequence[Log]) -> Scan:
         surface=surface,
         quality=quality(result, surface, config.scan_reach_mm) if surface else None,
         path=_trace(traces["path"], 3),
-        pressure=_trace(traces["pressure"], 1),
+        pressure=_trace(traces["pressure"], 2),
         place_s=np.array(place_s),
         step_contacts=_trace(traces["contacts"], 2),
         problem="" if result.complete else reason,
         config=config,
         logs=tuple(parts),
     )
+
+
+def _watched(log: Log) -> FloatArray:
+    armed = log.array("/pressure", "armed").astype(bool)
+    baseline_hpa = np.where(armed, log.array("/pressure", "baseline_hpa"), np.nan)
+    return np.stack([log.array("/pressure", "pressure_hpa"), baseline_hpa], axis=-1)
 
 
 def _trace(parts: Sequence[FloatArray], width: int) -> Trace:

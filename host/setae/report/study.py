@@ -13,7 +13,7 @@ from setae.errors import InputError
 from setae.experiments.study import MAP, RUNS, Row
 from setae.heightmap import HeightMap
 from setae.perception import maps
-from setae.report import clouds, files, palette, style, template
+from setae.report import clouds, extras, files, palette, style, template
 from setae.report.files import Report
 from setae.wording import counted
 
@@ -24,8 +24,8 @@ _COLUMNS = 8
 _ROWS = 8
 _MEASURES = (
     ("robot_s", "robot’s time (s)"),
-    ("height_rms_mm", "height RMS (mm)"),
-    ("chamfer_mm", "Chamfer (mm)"),
+    ("height_rms_mm", "height error, RMS (mm)"),
+    ("chamfer_mm", "Chamfer distance (mm)"),
 )
 
 
@@ -61,7 +61,7 @@ def write(
         done = [row for row in rows if row["status"] == "done"]
         if done:
             drawn.append(measures_picture(pictures / "measures.png", done, varied))
-            drawn.append(runs_picture(pictures / "runs.png", done, folder))
+            drawn.append(runs_picture(pictures / "runs.png", done, varied, folder))
         (folder / page).write_text(_page(rows, varied, drawn), encoding="utf-8")
     return Report(page=folder / page, pictures=tuple(drawn), tables=())
 
@@ -94,7 +94,7 @@ def measures_picture(path: Path, done: Sequence[Row], varied: Sequence[str]) -> 
         figure = style.figure(13.0, height)
         figure.text(0.015, 1 - 0.15 / height, "What the runs gave", fontsize=15, weight="bold",
                     va="top")  # fmt: skip
-        note = f"Simulated. {counted(len(done), 'run')}; a dot is a run, a bar the middle one."
+        note = f"Simulated. {counted(len(done), 'run')}; a dot is a run, a bar their median."
         figure.text(0.015, 1 - 0.5 / height, note, fontsize=10, color=palette.MUTED, va="top")
         grid = figure.add_gridspec(1, len(_MEASURES), left=0.045, right=0.99, wspace=0.2,
                                    bottom=(0.65 + 0.26 * len(cases)) / height,
@@ -102,7 +102,7 @@ def measures_picture(path: Path, done: Sequence[Row], varied: Sequence[str]) -> 
         for index, (name, title) in enumerate(_MEASURES):
             axes = figure.add_subplot(grid[index])
             _draw_measure(axes, done, varied, name, shapes, cases)
-            axes.set_title(title, fontsize=11, pad=6)
+            axes.set_title(f"{title[:1].upper()}{title[1:]}", fontsize=11, pad=6)
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, frameon=False, loc="lower left", ncols=1, fontsize=9,
                       bbox_to_anchor=(0.035, 0.0))  # fmt: skip
@@ -136,16 +136,18 @@ def _draw_measure(
             if values:
                 axes.hlines(np.median(values), middle - 0.38 * width, middle + 0.38 * width,
                             color=colour, lw=2)  # fmt: skip
-        axes.scatter(x, y, s=14, color=colour, alpha=0.6, linewidths=0, label=case)
+        # Nothing but the axes' ends would cut a dot in half.
+        axes.scatter(x, y, s=14, color=colour, alpha=0.6, linewidths=0, label=case, clip_on=False)
     axes.set_xticks(range(len(shapes)), [clouds.title_of(s).replace(" ", "\n") for s in shapes],
                     fontsize=9)  # fmt: skip
     axes.set_xlim(-0.5, len(shapes) - 0.5)
-    axes.set_ylim(bottom=0)
+    known = [float(row[name]) for row in done if row.get(name) is not None]
+    axes.set_ylim(0, 1.08 * max([*known, 0.0]) or 1.0)
     axes.grid(axis="y", color=palette.GRID)
     axes.set_axisbelow(True)
 
 
-def runs_picture(path: Path, done: Sequence[Row], folder: Path) -> Path:
+def runs_picture(path: Path, done: Sequence[Row], varied: Sequence[str], folder: Path) -> Path:
     """Draw the height maps of the first runs."""
     shown: list[tuple[Row, HeightMap]] = []
     for row in done:
@@ -156,27 +158,33 @@ def runs_picture(path: Path, done: Sequence[Row], folder: Path) -> Path:
                 continue  # the table has it; its map was taken away
     columns = min(_COLUMNS, max(len(shown), 1))
     count = -(-max(len(shown), 1) // columns)
+    felt = [heights.height_mm[np.isfinite(heights.height_mm)] for _, heights in shown]
+    tops_mm = [float(one.max()) if len(one) else 0.0 for one in felt]
+    # One range for all; something flat doesn't get all colours.
+    range_mm = max([_LEAST_RANGE_MM, *(float(np.ptp(one)) for one in felt if len(one))])
     with style.used():
-        width, height = 1.6 * columns + 0.5, 1.95 * count + 0.9
-        width = max(width, 6.0)
+        width, height = max(1.6 * columns + 1.3, 6.0), 1.95 * count + 1.4
         figure = style.figure(width, height)
-        figure.text(0.2 / width, 1 - 0.15 / height, "Height maps from above", fontsize=15,
-                    weight="bold", va="top")  # fmt: skip
         more = f" The first {len(shown)} of {len(done)} runs." if len(shown) < len(done) else ""
-        figure.text(0.2 / width, 1 - 0.5 / height, "Each in its own colours, from its top down."
-                    f"{more}", fontsize=10, color=palette.MUTED, va="top")  # fmt: skip
-        grid = figure.add_gridspec(count, columns, left=0.2 / width, right=1 - 0.2 / width,
-                                   bottom=0.3 / height, top=1 - 0.8 / height, wspace=0.1,
+        top = style.headline(
+            figure, "Height maps from above",
+            "Simulated. Below each: object, seed and combination. Colours: from each map's top "
+            f"down. Grey: nothing within reach. Dots: doubtful contacts.{more}",
+        )  # fmt: skip
+        grid = figure.add_gridspec(count, columns, left=0.2 / width, right=1 - 1.1 / width,
+                                   bottom=0.4 / height, top=top - 0.1 / height, wspace=0.1,
                                    hspace=0.25)  # fmt: skip
-        for index, (row, heights) in enumerate(shown):
+        for index, ((row, heights), top_mm) in enumerate(zip(shown, tops_mm, strict=True)):
             axes = figure.add_subplot(grid[divmod(index, columns)])
-            felt = heights.height_mm[np.isfinite(heights.height_mm)]
-            high_mm = float(felt.max()) if len(felt) else 0.0
-            # Something flat doesn't get all colours.
-            low_mm = min(float(felt.min()) if len(felt) else 0.0, high_mm - _LEAST_RANGE_MM)
-            clouds.draw_map(axes, heights, low_mm=low_mm, high_mm=high_mm)
-            name = f"{clouds.title_of(str(row['object']))} {row['seed']}\n{row['mode']}"
+            clouds.draw_map(axes, heights, low_mm=top_mm - range_mm, high_mm=top_mm)
+            name = f"{clouds.title_of(str(row['object']))} {row['seed']}\n{_case(row, varied)}"
             axes.set_xlabel(name, fontsize=7.5)
+        scale = extras.load("matplotlib.cm").ScalarMappable(cmap=style.colours(palette.HEIGHTS))
+        scale.set_clim(-range_mm, 0.0)
+        place = (1 - 0.9 / width, 0.4 / height, 0.16 / width, top - 0.5 / height)
+        bar = figure.colorbar(scale, cax=figure.add_axes(place))
+        bar.set_label("height, from the map's top (mm)", fontsize=9)
+        bar.ax.tick_params(labelsize=8)
         style.save(figure, path)
     return path
 

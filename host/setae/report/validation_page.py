@@ -197,7 +197,7 @@ def _data(runs: Sequence[Run]) -> dict[str, Any]:
             "ink": palette.INK,
             "grid": palette.GRID,
             "line": palette.MUTED,
-            "heat": [[place / 4, colour] for place, colour in enumerate(palette.HEAT)],
+            "errors": palette.stops(palette.AMOUNTS),
         },
     }
 

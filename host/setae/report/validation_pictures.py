@@ -59,13 +59,6 @@ def _origin(run: Run) -> str:
     return ", ".join(parts)
 
 
-def _title(figure: Any, text: str, note: str) -> None:
-    """Two lines above everything, whatever the figure's height."""
-    height = figure.get_figheight()
-    figure.text(0.02, 1 - 0.3 / height, text, fontsize=16, weight="bold", va="center")
-    figure.text(0.02, 1 - 0.62 / height, note, fontsize=10, color=palette.MUTED, va="center")
-
-
 # ------------------------------------------------------------------------------- boxes
 
 
@@ -74,11 +67,11 @@ def boxes_picture(path: Path, runs: Sequence[Run]) -> None:
     with style.used():
         figure = style.figure(10.5, 5.4)
         axes = figure.add_axes((0.07, 0.11, 0.915, 0.67))
-        _title(
+        style.headline(
             figure,
             "Distance between where it was sent and where it came to",
-            "In the bending plane. Boxes: quartiles; whiskers: up to 1.5 boxes; dots: beyond. "
-            f"{origin_note(runs).capitalize()}.",
+            f"{origin_note(runs).capitalize()}. Boxes: quartiles; whiskers: up to 1.5 boxes; dots: "
+            "beyond.",
         )
         _boxes(axes, runs)
         figure.legend(
@@ -159,20 +152,20 @@ def _box_handles(runs: Sequence[Run]) -> list[Any]:
 def bubbles_picture(path: Path, runs: Sequence[Run]) -> None:
     """Mean error over the directions at each of the 34 positions, as bubbles."""
     with style.used():
-        width = (5.4 if len(runs) < 3 else 4.5) * len(runs) + 0.6
-        figure = style.figure(max(width, 9.0), 5.4)
-        _title(
+        figure = style.figure(9.6, 4.6 * len(runs) + 1.0)
+        high = figure.get_figheight()
+        style.headline(
             figure,
             "Mean error at each position, over the four directions",
-            f"Area by error; the number is mm. Hollow: tendons that only pull can’t hold it. "
-            f"{origin_note(runs).capitalize()}.",
+            f"{origin_note(runs).capitalize()}. The number and the area: mm. Hollow: tendons that "
+            "only pull can’t hold it. Cross: combination out of reach, so no target.",
         )
-        span = 1.0 / len(runs)
-        left = 0.62 / figure.get_figwidth()
         for number, run in enumerate(runs):
-            axes = figure.add_axes((number * span + left, 0.12, span - 1.3 * left, 0.66))
+            bottom = (0.65 + 4.6 * (len(runs) - 1 - number)) / high
+            axes = figure.add_axes((0.065, bottom, 0.8, 3.6 / high))
             _bubbles(axes, run)
-            axes.set_title(f"model {run.model}", color=COLOURS.get(run.model, palette.INK), pad=8)
+            axes.set_title(f"Model {run.model}", color=COLOURS.get(run.model, palette.INK), pad=8)
+            _error_bar(figure, (0.9, bottom, 0.017, 3.6 / high))
         style.save(figure, path)
 
 
@@ -186,7 +179,7 @@ def _bubbles(axes: Any, run: Run) -> None:
     arc = combinations()
     beyond = ~workspace.check(arc, run.config, "paper").reachable
     top = arc.top_mm[beyond]
-    axes.scatter(top[:, 0], top[:, 2], s=16, marker="x", color="#c5ced6", lw=1.0, zorder=1)
+    axes.scatter(top[:, 0], top[:, 2], s=16, marker="x", color=palette.MUTED, lw=1.0, zorder=1)
     shown = [places[place] for place in errors]
     holds = run.held(shown)
     for target, error, good in zip(shown, errors.values(), holds, strict=True):
@@ -199,9 +192,10 @@ def _bubbles(axes: Any, run: Run) -> None:
         axes.annotate(
             f"{error:.1f}", (x, z), xytext=(0, 0 if error > 2.4 else 9),
             textcoords="offset points", ha="center",
-            va="center", fontsize=7.5, color=palette.INK, zorder=3,
+            va="center", fontsize=7.5, zorder=3,
+            color=palette.PAPER if good and error > 0.75 * _most_mm() else palette.INK,
         )  # fmt: skip
-    axes.set_xlim(0, 50)
+    axes.set_xlim(0, 3 + max(top[:, 0].max(), *(target.position_mm[0] for target in shown)))
     axes.set_ylim(36, 75)
     axes.set_xlabel("desired x or y (mm)")
     axes.set_ylabel("desired z (mm)")
@@ -210,8 +204,19 @@ def _bubbles(axes: Any, run: Run) -> None:
 
 
 def _heat(error_mm: float) -> str:
-    """Colour of an error, the scale's middle at the paper's mean."""
-    return palette.heat(error_mm / (2 * paper.validation()["all"].distance.mean_mm))
+    return palette.at(palette.AMOUNTS, error_mm / _most_mm())
+
+
+def _most_mm() -> float:
+    """Error with the scale's last colour: its middle is the paper's mean."""
+    return 2 * paper.validation()["all"].distance.mean_mm
+
+
+def _error_bar(figure: Any, place: tuple[float, float, float, float]) -> None:
+    scale = extras.load("matplotlib.cm").ScalarMappable(cmap=style.colours(palette.AMOUNTS))
+    scale.set_clim(0.0, _most_mm())
+    bar = figure.colorbar(scale, cax=figure.add_axes(place), extend="max")
+    bar.set_label("error in the bending plane (mm)")
 
 
 # ------------------------------------------------------------------------------ places
@@ -220,20 +225,22 @@ def _heat(error_mm: float) -> str:
 def places_picture(path: Path, runs: Sequence[Run]) -> None:
     """In each bending plane: every target, and an arrow to where the robot came to."""
     with style.used():
-        figure = style.figure(11.6, 0.9 + 3.45 * len(runs))
-        _title(
+        figure = style.figure(12.4, 0.95 + 3.45 * len(runs))
+        style.headline(
             figure,
             "Where it came to",
-            "Rings: targets, dashed where tendons can’t hold them; points: where the spring’s top "
-            f"was. {origin_note(runs).capitalize()}.",
+            f"{origin_note(runs).capitalize()}. Rings: targets, dashed where tendons can’t hold "
+            "them; points: where the spring’s top was.",
         )
         high = figure.get_figheight()
         for row, run in enumerate(runs):
             for column, plane in enumerate("XY"):
                 bottom = (high - 0.85 - 3.45 * (row + 1) + 0.5) / high
-                axes = figure.add_axes((0.065 + 0.495 * column, bottom, 0.43, 2.5 / high))
+                axes = figure.add_axes((0.055 + 0.46 * column, bottom, 0.405, 2.5 / high))
                 _places(axes, run, plane)
-                axes.set_title(f"plane of {plane} and Z, model {run.model}", pad=6)
+                axes.set_title(f"Plane of {plane} and Z, model {run.model}", pad=6)
+        bottom = 1 - (0.85 + 2.95) / high
+        _error_bar(figure, (0.94, bottom, 0.013, 2.5 / high))
         style.save(figure, path)
 
 
@@ -280,7 +287,7 @@ def targets_picture(path: Path, runs: Sequence[Run]) -> None:
     patches, lines = extras.load("matplotlib.patches"), extras.load("matplotlib.lines")
     with style.used():
         figure = style.figure(9.6, 6.6)
-        axes = figure.add_axes((0.075, 0.2, 0.9, 0.63))
+        axes = figure.add_axes((0.075, 0.18, 0.9, 0.65))
         workspace_pictures.draw_section(axes, run.config, "paper", 0.0)
         axes.set_title("")
         arc = combinations()
@@ -298,14 +305,16 @@ def targets_picture(path: Path, runs: Sequence[Run]) -> None:
                     side * top[some][:, 0], top[some][:, 2], s=22, marker=marker, color=colour,
                     edgecolors=None if marker == "x" else palette.INK, linewidths=0.9, zorder=5,
                 )  # fmt: skip
-        axes.set(xlim=(-60, 60), ylim=(12, 73))
+        side_mm = 3 + float(np.abs(top[:, 0]).max())
+        axes.set(xlim=(-side_mm, side_mm), ylim=(12, 73))
         axes.scatter(np.zeros(len(straight)), straight, s=22, color=palette.INK, zorder=5)
         held_count = int(kinds[0][0].sum())
-        _title(
+        style.headline(
             figure,
             "The targets in the workspace",
-            f"Of 63 combinations of height and bending {int(reach.reachable.sum())} are reached: "
-            f"the targets. {held_count} of them can be held by tendons that only pull.",
+            f"Computed, not measured. Of {reach.reachable.size} combinations of height and bending "
+            f"{int(reach.reachable.sum())} are reached: the targets. {held_count} of them can be "
+            "held by tendons that only pull.",
         )
 
         def dot(face: str, marker: str, label: str) -> Any:

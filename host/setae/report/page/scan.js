@@ -12,7 +12,7 @@ function show(index) {
       type: "scatter3d", mode: "markers", name, showlegend: false,
       x: chosen.map((p) => p[0]), y: chosen.map((p) => p[1]), z: chosen.map((p) => p[2]),
       marker: {
-        size, color: chosen.map((p) => p[2]), colorscale: run.colours.heat,
+        size, color: chosen.map((p) => p[2]), colorscale: run.colours.heights,
         cmin: scan.range_mm[0], cmax: scan.range_mm[1], line: { color: "#fff", width: 0.5 },
         colorbar: inferred ? undefined : { title: { text: `${scan.above} (mm)` }, thickness: 14, len: 0.7 },
       },

@@ -29,7 +29,7 @@ function show(index) {
     { type: "scatter", mode: "lines", x: lines.x, y: lines.y, line: { color: run.colours.line, width: 1.6 }, hoverinfo: "skip", showlegend: false },
     marks("found", {
       size: 8, color: poses.map((p) => p.error), cmin: 0, cmax: run.most,
-      colorscale: run.colours.heat, colorbar: { title: { text: "error (mm)" }, thickness: 14 },
+      colorscale: run.colours.errors, colorbar: { title: { text: "error (mm)" }, thickness: 14 },
     }),
     marks("target", {
       size: 12, symbol: poses.map((p) => (p.held ? "circle-open" : "circle-open-dot")),
