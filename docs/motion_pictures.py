@@ -58,13 +58,21 @@ def holding(path: Path) -> None:
             )
         where.plot([], [], color=colour, label=f"comes to rest, lengths of {model}")
         away = np.linalg.norm(rest.arc.top_mm - arc.top_mm, axis=-1)[lost]
-        slack.scatter(away, rest.slack_mm.max(axis=-1)[lost], color=colour, label=model, zorder=3)
+        slack.scatter(
+            away,
+            rest.slack_mm.max(axis=-1)[lost],
+            color=colour,
+            label=f"lengths of {model}",
+            zorder=3,
+        )
     nearest = workspace.nearest_holdable(arc[lost], CONFIG, "paper").top_mm
     where.scatter(
         nearest[:, 0], nearest[:, 2], s=26, marker="x", color=palette.INK, label="nearest held pose"
     )
     held = reach.reachable & reach.holdable
-    where.scatter(arc.top_mm[held, 0], arc.top_mm[held, 2], s=12, color=palette.MUTED)
+    where.scatter(
+        arc.top_mm[held, 0], arc.top_mm[held, 2], s=12, color=palette.MUTED, label="target, held"
+    )
     where.scatter(
         arc.top_mm[lost, 0],
         arc.top_mm[lost, 2],
@@ -74,13 +82,15 @@ def holding(path: Path) -> None:
         label="target, not held",
         zorder=3,
     )
-    where.set(title="the paper's 34 targets", xlabel="x, mm", ylabel="z, mm", aspect="equal")
-    where.set_ylim(20, 68)
+    where.set(
+        title="Computed: the paper's 34 targets", xlabel="x (mm)", ylabel="z (mm)", aspect="equal"
+    )
+    where.set_ylim(15, 68)
     where.legend(frameon=False, fontsize=8.5, loc="lower left")
     slack.set(
-        title="the eight that can't be held",
-        xlabel="spring's top, from the target, mm",
-        ylabel="slack of the loosest tendon, mm",
+        title="Computed: the eight that can't be held",
+        xlabel="spring's top, from the target (mm)",
+        ylabel="slack of the loosest tendon (mm)",
     )
     slack.grid(color=palette.GRID)
     slack.legend(frameon=False)
@@ -114,22 +124,22 @@ def packed(path: Path) -> None:
             for at in time_s[ends - 1]:
                 error.axvline(at, color=palette.GRID, zorder=0)
     half_tick = SERVOS.resolution_mm[0] * 500
-    for sign in (1, -1):
-        error.axhline(sign * half_tick, color=palette.MUTED, lw=1, ls="--")
-        error.axhline(sign * (half_tick + 10), color=palette.CONTACT, lw=1)
+    for sign, rounding, promised in ((1, "half a tick", "half a tick and 10 µm"), (-1, None, None)):
+        error.axhline(sign * half_tick, color=palette.MUTED, lw=1, ls="--", label=rounding)
+        error.axhline(sign * (half_tick + 10), color=palette.CONTACT, lw=1, label=promised)
     error.set(
-        title=f"played, less planned: {counts[10]} segments for {motion.frames} frames",
-        xlabel="time, s",
-        ylabel="µm of tendon",
-        ylim=(-32, 32),
+        title=f"Computed: {counts[10]} segments for {motion.frames} frames",
+        xlabel="time (s)",
+        ylabel="tendon, played less planned (µm)",
+        ylim=(-40, 30),
     )
     error.legend(frameon=False, ncols=3, fontsize=8.5, loc="lower center")
     count.plot(list(counts), list(counts.values()), "o-", color=palette.PRESSURE)
     count.axhline(motion.frames, color=palette.MUTED, lw=1, ls="--")
-    count.text(1, motion.frames + 1, "one a frame", color=palette.MUTED)
+    count.text(1, motion.frames + 1, "one for each frame", color=palette.MUTED)
     count.set(
-        title="what a tolerance saves",
-        xlabel="tolerance besides rounding, µm",
+        title="What a tolerance saves",
+        xlabel="tolerance besides rounding (µm)",
         ylabel="segments",
         ylim=(0, 56),
         xlim=(-0.5, 250),
@@ -143,7 +153,7 @@ def packed(path: Path) -> None:
 
 def paths(path: Path) -> None:
     """A way along waypoints with and without stops, and a circle under two models."""
-    figure = Figure(figsize=(9.6, 5.4), layout="constrained")
+    figure = Figure(figsize=(9.6, 6.0), layout="constrained")
     corner, speed, circle, lengths = figure.subplots(2, 2).ravel()
     motion = CONFIG.motion
     limits = Limits(
@@ -161,15 +171,25 @@ def paths(path: Path) -> None:
         label = f"{blend_mm:g} mm: {way.duration_s:.2f} s"
         corner.plot(top[:, 0], top[:, 1], color=colour, lw=1.8, label=label)
         _time(speed, way, way.speed_mm_s.max(axis=1), colour, label)
-    corner.plot(*points.top_mm[:, :2].T, "o", color=palette.INK, ms=4)
-    corner.set(title="waypoints, from above", xlabel="x, mm", ylabel="y, mm", aspect="equal")
-    speed.axhline(motion.move_speed_mm_s, color=palette.CONTACT, lw=1)
-    speed.set(title="fastest tendon", xlabel="time, s", ylabel="mm/s", xlim=(0, 1.05))
+    corner.plot(*points.top_mm[:, :2].T, "o", color=palette.INK, ms=4, label="given points")
+    corner.legend(*(part[-1:] for part in corner.get_legend_handles_labels()), frameon=False,
+                  fontsize=8.5, loc="lower left")  # fmt: skip
+    corner.set(
+        title="Computed: a way along points, from above",
+        xlabel="x (mm)",
+        ylabel="y (mm)",
+        aspect="equal",
+    )
+    speed.axhline(motion.move_speed_mm_s, color=palette.CONTACT, lw=1, label="limit")
+    speed.set(
+        title="The fastest tendon on it", xlabel="time (s)", ylabel="tendon's speed (mm/s)",
+        xlim=(0, 1.45), ylim=(0, 66),
+    )  # fmt: skip
     speed.legend(
-        loc="upper right",
+        loc="center right",
         frameon=False,
         fontsize=8.5,
-        title="blended before the corner by",
+        title="blended before a corner by",
         title_fontsize=8.5,
     )
     pose = kinematics.inverse((15.0, 0.0, 60.0))
@@ -181,9 +201,14 @@ def paths(path: Path) -> None:
         label = f"{model}: {way.duration_s:.2f} s, {len(way.bridges)} bridges"
         _time(circle, way, way.lengths_mm[:, 0], colour, label)
         _time(lengths, way, way.speed_mm_s[:, 0], colour, label)
-    circle.set(title="a circle at the tube's targets: tendon 0", xlabel="time, s", ylabel="mm")
-    circle.legend(frameon=False, fontsize=8.5)
-    lengths.set(title="its speed", xlabel="time, s", ylabel="mm/s")
+    circle.set(
+        title="A circle at the tube's targets: tendon 0",
+        xlabel="time (s)",
+        ylabel="tendon's length (mm)",
+    )
+    circle.set_ylim(57.8, 68.6)
+    circle.legend(frameon=False, fontsize=8.5, loc="upper center", ncols=2)
+    lengths.set(title="Its speed", xlabel="time (s)", ylabel="tendon's speed (mm/s)")
     _save(figure, path)
 
 

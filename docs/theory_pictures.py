@@ -53,8 +53,12 @@ def turning(path: Path) -> None:
     figure = Figure(figsize=(9.6, 3.9), layout="constrained")
     tube = kinematics.inverse((15.0, 0.0, 60.0))
     poses = (
-        ("z = 40 mm, bent by 90°", 40 * math.pi / 2, math.pi / 2),
-        ("the tube's targets, r = 15, z = 60 mm", float(tube.length_mm), float(tube.theta_rad)),
+        ("Computed: z = 40 mm, bent by 90°", 40 * math.pi / 2, math.pi / 2),
+        (
+            "Computed: the tube's targets, r = 15, z = 60 mm",
+            float(tube.length_mm),
+            float(tube.theta_rad),
+        ),
     )
     alpha = np.radians(np.arange(0.0, 360.05, 0.1))
     for axes, (title, length, theta) in zip(figure.subplots(1, 2), poses, strict=True):
@@ -62,10 +66,10 @@ def turning(path: Path) -> None:
         for model in ("parallel", "paper", "taut"):
             q = tendons.lengths(arc, GEOMETRY, model)[:, 0]
             _line(axes, np.degrees(alpha), q, model, jumps_mm=0.3)
-        axes.set(title=title, xlabel="bending direction α from the tendon, degrees", xlim=(0, 360))
+        axes.set(title=title, xlabel="bending direction α from the tendon (degrees)", xlim=(0, 360))
         axes.set_xticks(range(0, 361, 90))
         axes.grid(color=palette.GRID)
-    figure.axes[0].set_ylabel("tendon, mm")
+    figure.axes[0].set_ylabel("tendon's length (mm)")
     figure.axes[0].legend(frameon=False, loc="lower center")
     _save(figure, path)
 
@@ -91,9 +95,9 @@ def bending(path: Path) -> None:
     for label, dashes in (("ψ = 0°", "-"), ("ψ = 60°", "--"), ("ψ = 90°", ":")):
         sweep.plot([], [], dashes, color=palette.INK, linewidth=1.0, label=label)
     sweep.set(
-        title="against the offset arc, L = 60 mm",
-        xlabel="bending angle θ, degrees",
-        ylabel="tendon, less its offset arc, mm",
+        title="Against the offset arc, L = 60 mm",
+        xlabel="bending angle θ (degrees)",
+        ylabel="tendon, less its offset arc (mm)",
         xlim=(0, 90),
         ylim=(-6.5, 2.5),
     )
@@ -122,7 +126,7 @@ def _side_view(axes: Axes, *, length: float, theta: float) -> None:
     on_wall = (phi >= beta) & (phi <= theta - beta)
     touching = np.concatenate([ends[:, :1], arc(r - b)[:, on_wall], ends[:, 1:]], axis=1)
     axes.plot(*touching, color=COLOURS["taut"], linewidth=2.0, label="taut")
-    axes.set(title="inner tendon, 80°", aspect="equal", xlabel="x, mm", ylabel="z, mm")
+    axes.set(title="Computed: inner tendon, 80°", aspect="equal", xlabel="x (mm)", ylabel="z (mm)")
     axes.set_ylim(-3, 72)
     axes.legend(frameon=False, loc="upper left", fontsize=9)
 

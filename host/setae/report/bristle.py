@@ -107,8 +107,8 @@ def picture(path: Path, log: Log) -> Path:
                     va="center")  # fmt: skip
         figure.text(
             0.02, 0.915,
-            f"Largest change of pressure in {counted(len(free), 'move')} without contact and "
-            f"{len(touches)} with. {_note(log)}",
+            f"{_note(log)} Largest change of pressure in {counted(len(free), 'move')} without "
+            f"contact and {len(touches)} with.",
             fontsize=10, color=palette.MUTED, va="center",
         )  # fmt: skip
         whole = figure.add_axes((0.065, 0.5, 0.915, 0.335))
@@ -127,11 +127,11 @@ def picture(path: Path, log: Log) -> Path:
         _rates(figure.add_axes((0.065, 0.09, 0.26, 0.28)), moves, chosen.hpa, configured, most)
         _against(
             figure.add_axes((0.4, 0.09, 0.25, 0.28)), moves, "duration of a move (s)",
-            "without contact, by duration", touched=False,
+            "Without contact, by duration", touched=False,
         )  # fmt: skip
         _against(
             figure.add_axes((0.73, 0.09, 0.25, 0.28)), moves, "sent beyond the surface (mm)",
-            "touches, by depth", touched=True,
+            "Touches, by depth", touched=True,
         )  # fmt: skip
         style.save(figure, path)
     return path
@@ -152,8 +152,11 @@ def _rates(
     axes.plot(places, 100 * false, color=palette.PRESSURE, lw=2, label="false")
     axes.plot(places, 100 * missed, color=palette.CONTACT, lw=2, label="missed")
     _lines(axes, chosen_hpa, configured_hpa)
-    axes.set(xlim=(0, most_hpa), ylim=(-3, 103), xlabel="threshold (hPa)", ylabel="%")
-    axes.set_title("false and missed, by threshold", pad=8)
+    axes.set(xlim=(0, most_hpa), ylim=(-3, 103), xlabel="threshold (hPa)",
+             ylabel="moves, touches (%)")  # fmt: skip
+    axes.set_title("False and missed, by threshold", pad=8)
+    axes.legend(axes.get_lines()[:2], ("false", "missed"), frameon=False, fontsize=9,
+                loc="center left", bbox_to_anchor=(0.24, 0.6))  # fmt: skip
 
 
 def _against(axes: Any, moves: Sequence[Move], label: str, title: str, *, touched: bool) -> None:

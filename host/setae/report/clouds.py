@@ -45,7 +45,7 @@ def draw_cloud(axes: Any, heights: HeightMap, most_mm: float) -> None:
     half = max(60.0, float(np.abs(points[:, :2]).max())) if len(points) else 60.0
     rise = max(25.0, float(np.abs(points[:, 2]).max())) if len(points) else 25.0
     axes.set(xlim=(-half, half), ylim=(-half, half), zlim=(-rise, rise))
-    axes.set_box_aspect((1, 1, rise / half), zoom=1.08)
+    axes.set_box_aspect((1, 1, rise / half), zoom=0.97)
     axes.view_init(elev=_EYE_DEG[0], azim=_EYE_DEG[1])
     axes.tick_params(labelsize=7, pad=-2)
     axes.set(xticks=(-50, 0, 50), yticks=(-50, 0, 50), zticks=(-20, 0, 20))
@@ -66,7 +66,7 @@ def about_middle(heights: HeightMap) -> tuple[FloatArray, FloatArray]:
     return points, np.linalg.norm(points, axis=1)
 
 
-def draw_map(axes: Any, heights: HeightMap, *, low_mm: float, high_mm: float) -> Any:
+def draw_map(axes: Any, heights: HeightMap, *, low_mm: float, high_mm: float) -> None:
     """Draw a height map from above; places without a height stay grey, doubtful ones get a dot.
 
     Parameters
@@ -77,14 +77,9 @@ def draw_map(axes: Any, heights: HeightMap, *, low_mm: float, high_mm: float) ->
         The scan.
     low_mm, high_mm
         Ends of the colours' scale, z of the world.
-
-    Returns
-    -------
-    object
-        What a colour bar needs.
     """
     axes.set_facecolor(palette.UNKNOWN)
-    drawn = axes.imshow(
+    axes.imshow(
         heights.height_mm,
         origin="lower",
         extent=_extent(heights),
@@ -104,7 +99,6 @@ def draw_map(axes: Any, heights: HeightMap, *, low_mm: float, high_mm: float) ->
               color=palette.MUTED, va="bottom")  # fmt: skip
     for side in axes.spines.values():
         side.set(visible=True, color=palette.GRID)
-    return drawn
 
 
 def _extent(heights: HeightMap) -> tuple[float, float, float, float]:

@@ -122,8 +122,13 @@ def trials_picture(path: Path, found: Comparison) -> Path:
     shapes = found.shapes
     by_shape = {s: [i for i, label in enumerate(found.labels) if label == s] for s in shapes}
     columns = min(_TRIALS_SHOWN, max(len(some) for some in by_shape.values()))
-    base_mm, above = _base(found)
-    heights = np.concatenate([sample.heights.height_mm.ravel() for sample in found.samples])
+    bases_mm, above = _bases(found)
+    heights = np.concatenate(
+        [
+            sample.heights.height_mm.ravel() - base_mm
+            for sample, base_mm in zip(found.samples, bases_mm, strict=True)
+        ]
+    )
     low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
     with style.used():
         width, height = 1.75 * columns + 1.9, 2.0 * len(shapes) + 1.9
@@ -139,8 +144,9 @@ def trials_picture(path: Path, found: Comparison) -> Path:
         for row, (shape, some) in enumerate(by_shape.items()):
             for column, index in enumerate(some[:columns]):
                 axes = figure.add_subplot(grid[row, column])
-                drawn = clouds.draw_map(axes, found.samples[index].heights,
-                                        low_mm=low, high_mm=high)  # fmt: skip
+                base_mm = bases_mm[index]
+                clouds.draw_map(axes, found.samples[index].heights, low_mm=low + base_mm,
+                                high_mm=high + base_mm)  # fmt: skip
                 answer = found.answers[index]
                 said = "unknown"
                 if answer.known:
@@ -150,21 +156,22 @@ def trials_picture(path: Path, found: Comparison) -> Path:
                                 color=palette.AGREES if right else palette.CONTACT)  # fmt: skip
                 if column == 0:
                     axes.set_ylabel(clouds.title_of(shape), fontsize=10, weight="bold")
-        scale = figure.add_axes((1 - 0.85 / width, 0.3 / height, 0.16 / width, top - 0.42 / height))
-        bar = figure.colorbar(drawn, cax=scale)
+        scale = extras.load("matplotlib.cm").ScalarMappable(cmap=style.colours(palette.HEIGHTS))
+        scale.set_clim(low, high)
+        place = (1 - 0.85 / width, 0.3 / height, 0.16 / width, top - 0.42 / height)
+        bar = figure.colorbar(scale, cax=figure.add_axes(place))
         bar.set_label(f"height {above} (mm)", fontsize=9)
-        bar.formatter = lambda value, _: f"{value - base_mm:.0f}"
-        scale.tick_params(labelsize=8)
+        bar.ax.tick_params(labelsize=8)
         style.save(figure, path)
     return path
 
 
-def _base(found: Comparison) -> tuple[float, str]:
-    """Where heights are told from, z of the world, and in words: the table if it is known."""
-    tables = {sample.scene.table_z_mm if sample.scene else None for sample in found.samples}
-    if len(tables) == 1 and (table_mm := tables.pop()) is not None:
-        return table_mm, "above the table"
-    return 0.0, "from the arm's start"
+def _bases(found: Comparison) -> tuple[list[float], str]:
+    """Where heights are told from, z of the world, and in words: the tables if all are known."""
+    tables_mm = [sample.scene.table_z_mm for sample in found.samples if sample.scene]
+    if len(tables_mm) == len(found.samples):
+        return tables_mm, "above the table"
+    return [0.0] * len(found.samples), "from the arm's start"
 
 
 def _origin(found: Comparison) -> str:

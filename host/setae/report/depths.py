@@ -63,7 +63,7 @@ def trials_axes(axes: Any, trials: Sequence[Trial]) -> None:
     axes.invert_yaxis()
     deepest = [row.trial.descent_mm for row in rows]
     deepest += [row.theirs.descent_mm for row in rows if row.theirs is not None]
-    axes.set_xlim(0, 1.18 * max(deepest, default=0.0) or 1.0)
+    axes.set_xlim(0, 1.22 * max(deepest, default=0.0) or 1.0)
     axes.set_xlabel("descent of the arm (mm)")
     axes.grid(axis="x", color=palette.GRID, zorder=0)
     axes.spines["left"].set_visible(False)

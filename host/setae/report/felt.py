@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from setae.report import extras, palette, style
-from setae.report.trial import Direction, Level, Trial, origin_note
+from setae.report.trial import Level, Trial, origin_note
 
 
 def pressure_picture(path: Path, trial: Trial) -> None:
@@ -26,7 +26,8 @@ def pressure_picture(path: Path, trial: Trial) -> None:
         figure.text(
             0.02, 0.905,
             f"Trial {trial.number}, {origin_note([trial])}. A touch is a change of more than "
-            f"{trial.threshold_hpa:g} hPa against the pressure just before each reach.",
+            f"{trial.threshold_hpa:g} hPa against the pressure just before each reach. Colours: "
+            "direction α.",
             fontsize=10.5, color=palette.MUTED, va="center",
         )  # fmt: skip
         pressure_axes(whole, trial, trial.start_us, trial.end_us)
@@ -42,8 +43,7 @@ def pressure_picture(path: Path, trial: Trial) -> None:
         whole.set_title("The whole trial, and how deep the arm was", pad=20)
         if level is not None:
             pressure_axes(close, trial, level.start_us, level.end_us)
-            for direction in level.directions:
-                _name_direction(close, trial, direction)
+            name_directions(close, trial)
             close.set_title(f"At {level.descent_mm:.0f} mm of descent", pad=20)
         close.set_xlabel("time since the trial began (s)")
         handles, labels = whole.get_legend_handles_labels()
@@ -53,16 +53,28 @@ def pressure_picture(path: Path, trial: Trial) -> None:
         style.save(figure, path)
 
 
-def _name_direction(axes: Any, trial: Trial, direction: Direction) -> None:
-    axes.annotate(
-        f"{direction.alpha_deg:.0f}°",
-        (float(trial.seconds((direction.start_us + direction.end_us) / 2)), 1.02),
-        xycoords=("data", "axes fraction"),
-        ha="center",
-        fontsize=9.5,
-        weight="bold" if direction.touched else "normal",
-        color=palette.CONTACT if direction.touched else palette.MUTED,
-    )
+def name_directions(axes: Any, trial: Trial) -> None:
+    """Write the direction α above each coloured band that `pressure_axes` drew."""
+    begin_s, end_s = axes.get_xlim()
+    shown = [
+        (max(float(start_s), begin_s), min(float(stop_s), end_s), direction)
+        for level in trial.levels
+        for direction in level.directions
+        for start_s, stop_s in [trial.seconds([direction.start_us, direction.end_us])]
+        if stop_s > begin_s and start_s < end_s
+    ]
+    for start_s, stop_s, direction in shown:
+        # Where the bands are wide it says what the number is.
+        name = "α = " if stop_s - start_s > 0.2 * (end_s - begin_s) else ""
+        axes.annotate(
+            f"{name}{direction.alpha_deg:.0f}°",
+            ((start_s + stop_s) / 2, 1.02),
+            xycoords=("data", "axes fraction"),
+            ha="center",
+            fontsize=9.5,
+            weight="bold" if direction.touched else "normal",
+            color=palette.CONTACT if direction.touched else palette.MUTED,
+        )
 
 
 def pressure_axes(axes: Any, trial: Trial, start_us: int, end_us: int) -> None:

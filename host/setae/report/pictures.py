@@ -39,7 +39,7 @@ def overview_picture(path: Path, trials: Sequence[Trial]) -> None:
     floor = scene.floor_mm([trial])
     with style.used():
         figure = style.figure(13.2, 6.9)
-        robot = figure.add_axes((0.0, 0.02, 0.53, 0.96))
+        robot = figure.add_axes((0.0, 0.0, 0.53, 0.94))
         scene.draw(robot, trial, index, floor, [contact] if contact else [], scale=1.1)
         scene.frame(
             robot, trial, floor, motion.arm_mm[index, 2] + scene.ABOVE_MM, margin_mm=scene.MARGIN_MM
@@ -53,7 +53,7 @@ def overview_picture(path: Path, trials: Sequence[Trial]) -> None:
             frameon=False, fontsize=9, ncols=3, columnspacing=1.0, handlelength=1.4,
         )  # fmt: skip
         if contact is not None:
-            pressure = figure.add_axes((0.61, 0.11, 0.37, 0.24))
+            pressure = figure.add_axes((0.61, 0.11, 0.37, 0.215))
             felt.pressure_axes(
                 pressure, trial, contact.time_us - 1_000_000, contact.time_us + 900_000
             )
@@ -66,5 +66,12 @@ def overview_picture(path: Path, trials: Sequence[Trial]) -> None:
                 fontsize=9, ncols=3, columnspacing=1.0, handlelength=1.4,
             )  # fmt: skip
             pressure.set_xlabel("time since the trial began (s)")
-        figure.text(0.985, 0.012, origin_note(trials), fontsize=9, color=palette.MUTED, ha="right")
+            felt.name_directions(pressure, trial)
+        title = "The bristle touches the obstacle" if contact else "The robot in the tube"
+        figure.text(0.02, 0.955, title, fontsize=14, weight="bold", va="center")
+        origin = origin_note(trials)
+        figure.text(
+            0.02, 0.915, f"{origin[:1].upper()}{origin[1:]}", fontsize=10, color=palette.MUTED,
+            va="center",
+        )  # fmt: skip
         style.save(figure, path, dpi=130)

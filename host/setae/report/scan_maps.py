@@ -34,6 +34,8 @@ def heights_picture(path: Path, scans: Sequence[Scan]) -> None:
                 "with a dot: at an edge, or where nothing is in reach."
             )
         top = style.headline(figure, "Height maps from above", note)
+        bottom = (0.35 if columns > 1 else 0.6) / figure.get_figheight()
+        style.arrange(figure, bottom=bottom, top=top)
         axes = figure.subplots(rows, columns, squeeze=False)
         for scan, row in zip(scans, axes, strict=True):
             high_mm = top_mm(scan)
@@ -48,8 +50,6 @@ def heights_picture(path: Path, scans: Sequence[Scan]) -> None:
             handles=_handles(scans), loc="lower left", ncols=6 if columns > 1 else 3,
             frameon=False, fontsize=9.5, borderaxespad=0.8,
         )  # fmt: skip
-        bottom = (0.35 if columns > 1 else 0.6) / figure.get_figheight()
-        style.arrange(figure, bottom=bottom, top=top)
         style.save(figure, path, dpi=120)
 
 

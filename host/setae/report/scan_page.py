@@ -12,7 +12,8 @@ import numpy as np
 from setae.experiments.scan.quality import agreement
 from setae.heightmap import TOUCHED
 from setae.report import extras, palette, solving, template
-from setae.report.scan_pictures import cloud, top_mm
+from setae.report.scan_maps import top_mm
+from setae.report.scan_pictures import cloud
 from setae.report.scan_reading import Scan
 from setae.wording import counted
 

@@ -163,6 +163,7 @@ def paths_picture(path: Path, scans: Sequence[Scan]) -> None:
     with style.used():
         figure = style.figure(6.4 * len(scans), 6.0)
         top = style.headline(figure, "The arm's way from above", _note(scans))
+        style.arrange(figure, bottom=0.36 / figure.get_figheight(), top=top)
         for axes, scan in zip(figure.subplots(1, len(scans), squeeze=False)[0], scans, strict=True):
             way = scan.path.value[:, :2]
             lines = collections.LineCollection(
@@ -186,7 +187,6 @@ def paths_picture(path: Path, scans: Sequence[Scan]) -> None:
             square(axes, scan)
             axes.set_title(f"{title(scan)}: {scan.result.duration_s:.0f} s")
         _legend(figure)
-        style.arrange(figure, bottom=0.36 / figure.get_figheight(), top=top)
         style.save(figure, path, dpi=120)
 
 
@@ -195,6 +195,7 @@ def pressure_picture(path: Path, scans: Sequence[Scan]) -> None:
     with style.used():
         figure = style.figure(12.4, 2.8 * len(scans) + 1.7)
         top = style.headline(figure, "What the bristle felt", _note(scans))
+        style.arrange(figure, bottom=0.36 / figure.get_figheight(), top=top)
         axes = figure.subplots(
             len(scans), 2, squeeze=False, gridspec_kw={"width_ratios": [1.7, 1.0]}
         )
@@ -213,7 +214,6 @@ def pressure_picture(path: Path, scans: Sequence[Scan]) -> None:
             whole.set_title(title(scan))
             close.set_title("The beginning" if first_s is None else "Around the first touch")
         _legend(figure)
-        style.arrange(figure, bottom=0.36 / figure.get_figheight(), top=top)
         style.save(figure, path, dpi=120)
 
 

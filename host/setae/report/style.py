@@ -61,7 +61,7 @@ def headline(drawn: Any, text: str, note: str) -> float:
 
 
 def arrange(drawn: Any, *, bottom: float, top: float) -> None:
-    """Let a figure's axes fill it between two shares of its height, and nothing overlap."""
+    """Let axes that are drawn later fill it between two shares of its height, without overlaps."""
     drawn.set_layout_engine("compressed", rect=(0, bottom, 1, top - bottom))
     drawn.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
 

@@ -195,7 +195,7 @@ def _bubbles(axes: Any, run: Run) -> None:
             va="center", fontsize=7.5, zorder=3,
             color=palette.PAPER if good and error > 0.75 * _most_mm() else palette.INK,
         )  # fmt: skip
-    axes.set_xlim(0, 3 + max(top[:, 0].max(), *(target.position_mm[0] for target in shown)))
+    axes.set_xlim(0, 3 + max([top[:, 0].max(), *(target.position_mm[0] for target in shown)]))
     axes.set_ylim(36, 75)
     axes.set_xlabel("desired x or y (mm)")
     axes.set_ylabel("desired z (mm)")
