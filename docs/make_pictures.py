@@ -55,9 +55,7 @@ def draw_causes(run: Path) -> None:
     """Draw what each imperfection costs into docs/pictures."""
     study = record.read(run / f"{causes.EXPERIMENT}.mcap")
     effects = causes.effects(study)
-    targets = study.events("case")[0].data["targets"]
-    note = f"Simulated, plant {study.metadata['plant']}, {targets} targets."
-    why.picture(PICTURES / "causes.png", effects, note)
+    why.picture(PICTURES / "causes.png", effects, why.note_of(study))
 
 
 def draw_shapes(run: Path) -> None:
@@ -94,7 +92,7 @@ def main(arguments: list[str]) -> None:
         run_setae(*like, *models, "--out", str(validated))
         draw_validation(validated)
         part = Path(folder) / "causes"
-        run_setae(*like, "--targets", "40", "--causes", "--out", str(part))
+        run_setae(*like, "--causes", "--out", str(part))
         draw_causes(part)
         felt = Path(folder) / "bristle"
         run_setae("calibrate", "bristle", "--moves", "200", "--touches", "200", "--out", str(felt))

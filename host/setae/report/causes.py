@@ -9,12 +9,20 @@ from pathlib import Path
 import numpy as np
 
 from setae.experiments.causes import MODEL, Effect
+from setae.experiments.targets import paper_targets
+from setae.record import Log
 from setae.report import extras, palette, style, template
 
-__all__ = ["picture", "section"]
+__all__ = ["note_of", "picture", "section"]
 
 _GAIN = palette.AGREES
 _ADD = palette.BRISTLE
+
+
+def note_of(study: Log) -> str:
+    """Say where a study is from, and how many of the paper's targets its means are of."""
+    driven, of_all = study.events("case")[0].data["targets"], len(paper_targets(study.config))
+    return f"Simulated, plant {study.metadata.get('plant')}, {driven} of {of_all} targets."
 
 
 def picture(path: Path, effects: Sequence[Effect], note: str) -> Path:

@@ -62,8 +62,8 @@ def write(
         section = ""
         for study in studies:
             if effects := causes.effects(study):
-                note = f"{validation_pictures.origin_note(shown[:1]).capitalize()}."
-                chart = why.picture(folder / "pictures" / "causes.png", effects, note)
+                drawn_to = folder / "pictures" / "causes.png"
+                chart = why.picture(drawn_to, effects, why.note_of(study))
                 section, drawn = why.section(effects, chart), (*drawn, chart)
         text = validation_page.page(shown, drawn, section)
         (folder / page).write_text(text, encoding="utf-8")
