@@ -136,8 +136,9 @@ lint: .venv/.dev ## style, types and the direction of imports
 	@$(BIN)/cmake --build build/strict >build/strict/log || { cat build/strict/log; exit 1; }
 
 .PHONY: drift
-drift: .venv/.dev ## are the generated files those that the schema gives?
+drift: .venv/.dev ## are generated files those that the schema gives, README's figures the last?
 	$(BIN)/python protocol/generate.py --check
+	$(BIN)/python bench/readme.py --check
 
 .PHONY: firmware-test
 firmware-test: ## the firmware's unit tests, on this machine

@@ -31,6 +31,7 @@ from bench import (  # noqa: E402  # needs the path
     link_model,
     motion,
     perception,
+    readme,
     scan,
     validation,
 )
@@ -313,6 +314,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"{figure.name:<28} {figure.value:>10g} {figure.unit:<10} {figure.how}")
             known[figure.name] = asdict(figure)
     options.out.write_text(json.dumps(list(known.values()), indent=2) + "\n")
+    if options.out == readme.RESULTS:
+        readme.main([])
 
 
 if __name__ == "__main__":
