@@ -99,10 +99,13 @@ def bending(path: Path) -> None:
         xlabel="bending angle θ (degrees)",
         ylabel="tendon, less its offset arc (mm)",
         xlim=(0, 90),
-        ylim=(-6.5, 2.5),
+        ylim=(-7, 2),
     )
     sweep.grid(color=palette.GRID)
-    sweep.legend(frameon=False, loc="lower left", ncols=2, fontsize=9)
+    sweep.legend(
+        frameon=False, loc="lower left", ncols=2, fontsize=9, title_fontsize=9, alignment="left",
+        title="ψ: bending direction, from the tendon",
+    )  # fmt: skip
     _save(figure, path)
 
 
@@ -116,9 +119,9 @@ def _side_view(axes: Axes, *, length: float, theta: float) -> None:
 
     wall = np.concatenate([arc(r - b), arc(r + b)[:, ::-1]], axis=1)
     axes.fill(*wall, color=palette.PANEL, zorder=0)
-    for radius in (r - b, r + b):
-        axes.plot(*arc(radius), color=palette.SPRING, linewidth=1.5)
-    axes.plot(*arc(r), color=palette.SPRING, linewidth=0.8, linestyle="-.")
+    for radius, label in ((r - b, "bore's wall"), (r + b, None)):
+        axes.plot(*arc(radius), color=palette.SPRING, linewidth=1.5, label=label)
+    axes.plot(*arc(r), color=palette.SPRING, linewidth=0.8, linestyle="-.", label="axis")
     ends = arc(r - d)[:, [0, -1]]
     axes.plot(*ends, color=palette.MUTED, linewidth=1.0, label="chord: through the wall")
     axes.plot(*arc(r - d), color=COLOURS["parallel"], linewidth=1.5, label="offset arc")
@@ -127,7 +130,7 @@ def _side_view(axes: Axes, *, length: float, theta: float) -> None:
     touching = np.concatenate([ends[:, :1], arc(r - b)[:, on_wall], ends[:, 1:]], axis=1)
     axes.plot(*touching, color=COLOURS["taut"], linewidth=2.0, label="taut")
     axes.set(title="Computed: inner tendon, 80°", aspect="equal", xlabel="x (mm)", ylabel="z (mm)")
-    axes.set_ylim(-3, 72)
+    axes.set_ylim(-3, 84)
     axes.legend(frameon=False, loc="upper left", fontsize=9)
 
 

@@ -129,23 +129,22 @@ def directions_picture(path: Path, trials: Sequence[Trial]) -> None:
     """Draw, per trial, a rose of the directions felt at each depth; red where it touched."""
     depths = sorted({level.descent_mm for trial in trials for level in trial.levels})
     with style.used():
-        # Three roses' width at least, or the line below the title doesn't fit.
-        figure = style.figure(2.9 * max(len(trials), 3) + 0.4, 4.5)
-        figure.text(0.02, 0.93, "Where the bristle touched", fontsize=17, weight="bold")
-        figure.text(
-            0.02, 0.865,
-            "Looking down the tube. One ring a depth, the outermost the deepest; one sector a "
-            f"direction α. {origin_note(trials).capitalize()}.",
-            fontsize=10.5, color=palette.MUTED,
+        # Three roses' width at least, or the line below the title needs too many lines.
+        figure = style.figure(2.9 * max(len(trials), 3) + 0.4, 4.7)
+        style.headline(
+            figure, "Where the bristle touched",
+            f"{origin_note(trials).capitalize()}. Looking down the tube. One ring a depth, the "
+            "outermost the deepest: its number is the arm's descent in mm. One sector a "
+            "direction α.",
         )  # fmt: skip
         width = 1.0 / len(trials)
         for position, trial in enumerate(trials):
             axes = figure.add_axes(
-                (position * width + 0.1 * width, 0.13, 0.8 * width, 0.57), projection="polar"
+                (position * width + 0.1 * width, 0.12, 0.8 * width, 0.55), projection="polar"
             )
             _rose(axes, trial, depths)
             figure.text(
-                (position + 0.5) * width, 0.775, f"Trial {trial.number}: {trial.label}",
+                (position + 0.5) * width, 0.755, f"Trial {trial.number}: {trial.label}",
                 ha="center", fontsize=10.5, weight="bold",
             )  # fmt: skip
         _legend(figure)

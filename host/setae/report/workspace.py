@@ -192,7 +192,7 @@ def picture(path: Path, config: Config, model: str, measured: Volumes) -> Path:
         figure.text(
             0.03, 0.955, "Where the spring’s top can be", fontsize=15, fontweight="bold", va="top"
         )
-        figure.text(0.03, 0.895, finding(measured, model), fontsize=10.5, va="top",
+        figure.text(0.03, 0.895, f"Computed. {finding(measured, model)}", fontsize=10.5, va="top",
                     color=palette.MUTED)  # fmt: skip
         _legend(figure, measured)
         style.save(figure, path)
