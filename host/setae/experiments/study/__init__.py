@@ -6,7 +6,14 @@ what came out, and `table` makes one table of it.
 
 from __future__ import annotations
 
-from setae.experiments.study.conducting import RUNS, Row, conduct, require, workers_for
+from setae.experiments.study.conducting import (
+    RUNS,
+    Row,
+    conduct,
+    prepare_workers,
+    require,
+    workers_for,
+)
 from setae.experiments.study.one import MAP, Outcome, perform
 from setae.experiments.study.plan import Plan, Run, load, of_options
 from setae.experiments.study.table import read_table, with_earlier, write_table
@@ -22,6 +29,7 @@ __all__ = [
     "load",
     "of_options",
     "perform",
+    "prepare_workers",
     "read_table",
     "require",
     "with_earlier",

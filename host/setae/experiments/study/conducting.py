@@ -23,7 +23,16 @@ from setae.errors import InputError, SetaeError
 from setae.experiments.study.one import LOG, Outcome, perform
 from setae.experiments.study.plan import Run
 
-__all__ = ["LINE", "RUNS", "Row", "conduct", "finished", "require", "workers_for"]
+__all__ = [
+    "LINE",
+    "RUNS",
+    "Row",
+    "conduct",
+    "finished",
+    "prepare_workers",
+    "require",
+    "workers_for",
+]
 
 Row: TypeAlias = Mapping[str, Any]
 """A run's line of the table."""
@@ -71,6 +80,16 @@ def workers_for(workers: int | None, scheduler: str | None) -> int:
     if workers < 1:
         raise InputError(f"{workers} workers do nothing.", "Give 1 or more.")
     return workers
+
+
+def prepare_workers() -> None:
+    """Begin the process that workers on this machine come out of; it ends with this one.
+
+    `conduct` does so itself. Whoever has something else to import first does it sooner.
+    """
+    with _interrupts_held_back():
+        multiprocessing.set_forkserver_preload(list(_NEEDED))
+        forkserver.ensure_running()
 
 
 def conduct(
@@ -175,7 +194,7 @@ def _distributed(
     runs: Sequence[Run], workers: int, scheduler: str | None, task: Callable[[Run], Outcome]
 ) -> Iterator[tuple[Run, Outcome]]:
     if scheduler is None:
-        _prepare_workers()
+        prepare_workers()
     distributed = extras.load("distributed", "study", "More than one worker")
     dask_config = extras.load("dask.config", "study", "More than one worker")
     with ExitStack() as stack:
@@ -213,13 +232,6 @@ def _distributed(
             run = of[future.key]
             lost = future.exception()
             yield run, future.result() if lost is None else _lost(run, lost)
-
-
-def _prepare_workers() -> None:
-    """Begin the process that workers come out of; it ends with this one."""
-    with _interrupts_held_back():
-        multiprocessing.set_forkserver_preload(list(_NEEDED))
-        forkserver.ensure_running()
 
 
 @contextmanager
