@@ -21,7 +21,6 @@ from setae.errors import (
     ExtraMissingError,
     StageError,
 )
-from setae.ur.quiet import silence
 
 __all__ = ["RUNNING", "ArmState", "Controller", "check"]
 
@@ -97,7 +96,6 @@ def _load_libraries() -> _Libraries:
         import rtde_receive
     except ImportError as error:
         raise ExtraMissingError("ur", "Driving a UR arm") from error
-    silence()
     return _Libraries(rtde_control, rtde_receive, dashboard_client)
 
 
