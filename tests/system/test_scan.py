@@ -132,6 +132,32 @@ def test_the_adaptive_scan_finds_the_same_in_less_time() -> None:
     assert np.median(np.abs(difference_mm)) < 0.5
 
 
+def test_the_adaptive_scan_finds_where_an_object_ends_between_its_rows() -> None:
+    # A ring's end between two rows that were traced was taken for nothing: both rows had nothing
+    # there, one of them beyond the ring and the other in its hole. So were other round ends.
+    config = coarse(7, coarse_mm=60.0)
+    top_mm, high_mm = -100.0, 30.0
+    parts = [(20.0, 55.0, 14.0, 50.0), (60.0, 55.0, 14.0, 50.0), (40.0, 80.0, 54.0, 16.0)]
+    scene = Blocks(
+        tuple(
+            Box(
+                centre_mm=(x_mm, y_mm, top_mm - high_mm / 2),
+                edges_mm=(wide_mm, deep_mm, high_mm),
+                yaw_rad=0.0,
+            )
+            for x_mm, y_mm, wide_mm, deep_mm in parts
+        )
+    )
+    with rig.open("sim://", config=config, scene=scene) as opened:
+        opened.robot.enable()
+        result = scan(opened.robot, opened.stage, mode="adaptive")
+    heights_mm = result.height_map.height_mm
+    assert np.isfinite(heights_mm[3, (1, 3)]).all()
+    assert np.isnan(heights_mm[3, 2])
+    assert np.isnan(heights_mm[6]).all()
+    assert heights_mm[4, 2] == pytest.approx(top_mm, abs=HEIGHT_ERROR_MM)
+
+
 def test_nothing_is_found_on_an_empty_table() -> None:
     for mode in MODES:
         config = coarse(3)

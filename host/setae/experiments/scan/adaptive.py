@@ -260,9 +260,20 @@ class _Tracer:
                     votes_mm.append(low_mm + part * (high_mm - low_mm))
                 elif math.isfinite(low_mm) and math.isfinite(high_mm):
                     return None  # something, and nobody knows how high
-        if votes_mm and all(self._flat(votes_mm[0], vote_mm) for vote_mm in votes_mm):
-            return votes_mm[len(votes_mm) // 2]
-        return None
+        if not votes_mm or not all(self._flat(votes_mm[0], vote_mm) for vote_mm in votes_mm):
+            return None
+        # Inside of an object in one row and outside in the other: it may end at the place.
+        if math.isnan(votes_mm[0]) and self._inside(column, below) != self._inside(column, above):
+            return None
+        return votes_mm[len(votes_mm) // 2]
+
+    def _inside(self, column: int, row: int) -> bool:
+        """Whether something is known to stand near to both sides of a place in its row."""
+        near = range(1, self._rows_between + 1)
+        return all(
+            any(math.isfinite(self._survey.height_mm((column + way * far, row))) for far in near)
+            for way in (-1, 1)
+        )
 
     def _flat(self, one_mm: float, other_mm: float) -> bool:
         if math.isnan(one_mm) or math.isnan(other_mm):
