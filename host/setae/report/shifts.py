@@ -101,6 +101,16 @@ def _moment(row: Comparison) -> _Moment | None:
     expected_mm = row.theirs.descent_mm if row.theirs else math.inf
     if trial.contacts and trial.descent_mm <= expected_mm:
         contact = trial.contacts[0]
+        alpha_deg = trial.azimuth_deg if contact.alpha_deg is None else contact.alpha_deg
+        starts_us = [event.time_us for event in trial.log.events("direction_start")]
+        before_us = [start_us for start_us in starts_us if start_us < contact.time_us]
+        if not trial.complete and before_us:  # it could not get clear: how it hangs matters
+            return _Moment(
+                time_us=before_us[-1],
+                when=f"{contact.descent_mm:g} mm down, short and straight before it touched",
+                alpha_deg=alpha_deg,
+                jerk=False,
+            )
         where = (
             "while the arm lowered"
             if contact.alpha_deg is None
@@ -109,7 +119,7 @@ def _moment(row: Comparison) -> _Moment | None:
         return _Moment(
             time_us=contact.time_us,
             when=f"at the first touch, {contact.descent_mm:g} mm down {where}",
-            alpha_deg=trial.azimuth_deg if contact.alpha_deg is None else contact.alpha_deg,
+            alpha_deg=alpha_deg,
             jerk=not np.isfinite(contact.true_point_mm).all(),
         )
     if trial.cube is None:
