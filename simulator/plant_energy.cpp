@@ -18,7 +18,6 @@ void Plant::evaluate(const Modes& modes, State& state) {
   ++evaluations_;
   state.modes = modes;
   rod_.shape(modes, state.shape);
-  state.path_known = {};
   for (int i = 0; i < settings_.tendons; ++i)
     find_path(i, state);
   add_weight(state);
@@ -31,17 +30,19 @@ void Plant::find_path(int i, State& state) const {
   TendonPath& path = state.paths[i];
   path.solve(state.shape, settings_.base_hole_mm[i], settings_.top_hole_mm[i],
              settings_.bore_radius_mm, slack_mm);
-  if (path.length_mm() < slack_mm)
+  state.path_known[i] = path.length_mm() >= slack_mm;
+  if (!state.path_known[i])
     return;
-  state.path_known[i] = true;
   state.path_gradient[i] = Modes{};
   rod_.pull_back(state.shape, path.wrenches(), state.path_gradient[i]);
 }
 
-// The same shape under other lengths: only a path that was slack by far may be missing.
+// The same shape under other lengths: a path that was slack by far may be missing, and one
+// that did not settle goes on.
 void Plant::reload(State& state) {
   for (int i = 0; i < settings_.tendons; ++i) {
-    if (!state.path_known[i] && state.paths[i].length_mm() >= lengths_mm_[i] - kSlack_mm)
+    const bool slack = state.paths[i].length_mm() < lengths_mm_[i] - kSlack_mm;
+    if (!state.paths[i].converged() || (!state.path_known[i] && !slack))
       find_path(i, state);
   }
   load(state);

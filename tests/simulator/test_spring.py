@@ -114,6 +114,13 @@ def test_a_spring_that_buckles_rests_in_several_ways_and_tells_each() -> None:
     assert again.same_as(straight[0])
 
 
+def test_a_start_with_a_tendon_all_around_the_bore_settles() -> None:
+    """A tendon's path that had not settled at the start was kept, and the spring never moved."""
+    rests = Spring(parameters=plants.parameters("paper_like")).rests((31.3, 62.9, 31.5, 55.3))
+    assert len(rests) == 2
+    assert rests.unsettled == ()
+
+
 def test_where_it_was_before_says_where_it_rests() -> None:
     spring = Spring(parameters=LONG)
     left = spring.rest([60.0] * 4, bend_deg=(EVERY, EVERY))
