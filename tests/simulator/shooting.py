@@ -27,7 +27,6 @@ STEPS = 40
 FREE = {
     "spring.bore_radius_mm": 60.0,
     "spring.solid_length_mm": 1.0,
-    "plant.gravity_m_s2": 0.0,
     "tendon.friction": 0.0,
 }
 
@@ -42,12 +41,13 @@ POSES_MM = (
     (35.2, 42.7, 38.8, 31.3),  # short, all four taut: bent in an S
 )  # fmt: skip
 
-# The same on a robot that is nowhere symmetric.
+# The same on a robot that is nowhere symmetric, with gravity from aside and a load beyond its tip.
 UNEVEN = {
     "spring.bending_scale_x": 0.7, "spring.bending_scale_y": 0.9, "spring.bending_axis_deg": 30.0,
     "spring.stiffness_gradient": 0.2, "spring.shear_scale": 0.8, "servo.stiffness_n_per_mm": 15.0,
     "plant.load_x_n": 0.03, "plant.load_y_n": -0.02, "plant.load_z_n": 0.1,
     "plant.load_offset_mm": 20.0,
+    "plant.gravity_tilt_deg": 60.0, "plant.gravity_azimuth_deg": 40.0,
     "tendon.base_radial_mm_0": -0.5, "tendon.base_tangential_mm_1": 0.4,
     "tendon.top_radial_mm_2": 0.3, "tendon.top_tangential_mm_3": -0.6,
 }  # fmt: skip
@@ -66,6 +66,8 @@ class Robot:
     tendon_n_per_mm: float
     load_n: Array
     load_offset_mm: float
+    weight_n: Array  # of the spring, (3,)
+    tip_weight_n: Array
 
     @classmethod
     def of(cls, parameters: Mapping[str, float]) -> Robot:
@@ -83,6 +85,13 @@ class Robot:
                 result[i] = (8.3 + radial) * out + tangential * np.array([-out[1], out[0], 0])
             return result
 
+        tilt, azimuth = (
+            np.radians(parameters.get(f"plant.gravity_{angle}_deg", 0.0))
+            for angle in ("tilt", "azimuth")
+        )
+        down = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth),
+                         np.cos(tilt)])  # fmt: skip
+        gravity_n_per_g = 1e-3 * parameters.get("plant.gravity_m_s2", 9.81) * down
         line, servo = 10.0, parameters.get("servo.stiffness_n_per_mm", 1e6)
         return cls(
             bending=turn @ np.diag(BENDING * np.array(scales)) @ turn.T,
@@ -94,10 +103,12 @@ class Robot:
             tendon_n_per_mm=line * servo / (line + servo),
             load_n=np.array([parameters.get(f"plant.load_{axis}_n", 0.0) for axis in "xyz"]),
             load_offset_mm=parameters.get("plant.load_offset_mm", 0.0),
+            weight_n=25.0 * gravity_n_per_g,
+            tip_weight_n=15.0 * gravity_n_per_g,
         )
 
 
-def _rotation(q: Array) -> Array:
+def rotation_of(q: Array) -> Array:
     x, y, z, w = q / np.linalg.norm(q)
     return np.array(
         [
@@ -108,10 +119,11 @@ def _rotation(q: Array) -> Array:
     )
 
 
-def _slope(robot: Robot, compliance: Array, along: float, state: Array, force: Array) -> Array:
+def slope(robot: Robot, compliance: Array, along: float, state: Array, force: Array) -> Array:
     """Position, quaternion and moment by reference length."""
     q, moment = state[3:7], state[7:10]
-    rotation = _rotation(q)
+    rotation = rotation_of(q)
+    force = force - along / LENGTH_MM * robot.weight_n  # what is above carries no more
     weight = 1 + robot.gradient * (2 * along / LENGTH_MM - 1)
     stretch = rotation.T @ force / [robot.shear_n, robot.shear_n, AXIAL_N] / weight + [0, 0, 1]
     u = compliance @ (rotation.T @ moment) / weight
@@ -140,13 +152,13 @@ def _shoot(
     h = LENGTH_MM / STEPS
     for step in range(STEPS):  # Runge and Kutta
         at = step * h
-        a = _slope(robot, compliance, at, state, force)
-        b = _slope(robot, compliance, at + 0.5 * h, state + 0.5 * h * a, force)
-        c = _slope(robot, compliance, at + 0.5 * h, state + 0.5 * h * b, force)
-        d = _slope(robot, compliance, at + h, state + h * c, force)
+        a = slope(robot, compliance, at, state, force)
+        b = slope(robot, compliance, at + 0.5 * h, state + 0.5 * h * a, force)
+        c = slope(robot, compliance, at + 0.5 * h, state + 0.5 * h * b, force)
+        d = slope(robot, compliance, at + h, state + h * c, force)
         state = state + h / 6 * (a + 2 * b + 2 * c + d)
-    top, rotation = state[:3], _rotation(state[3:7])
-    pull = robot.load_n.copy()
+    top, rotation = state[:3], rotation_of(state[3:7])
+    pull = robot.load_n + robot.tip_weight_n
     twist = np.cross(robot.load_offset_mm * rotation[:, 2], robot.load_n)
     tensions = np.zeros(4)
     for i in range(4):
@@ -158,6 +170,7 @@ def _shoot(
         tensions[i] = robot.tendon_n_per_mm * max(0.0, taut)
         pull += tensions[i] * string / length
         twist += np.cross(arm, tensions[i] * string / length)
+    force = force - robot.weight_n
     return np.concatenate([force - pull, 0.1 * (state[7:10] - twist)]), top, tensions
 
 
@@ -170,8 +183,10 @@ def solve(parameters: Mapping[str, float], truth: Truth) -> tuple[Array, Array]:
     robot = Robot.of(parameters)
     lengths_mm = truth.servo_length_mm
     top, rotation = truth.backbone_mm[-1], truth.rotation
-    force = robot.load_n.copy()
+    force = robot.load_n + robot.tip_weight_n + robot.weight_n
     moment = np.cross(top + robot.load_offset_mm * rotation[:, 2], robot.load_n)
+    moment += np.cross(top, robot.tip_weight_n)
+    moment += np.cross(truth.backbone_mm.mean(axis=0), robot.weight_n)
     for base, hole, tension in zip(robot.base, robot.top, truth.tension_n, strict=True):
         at = top + rotation @ hole
         pull = tension * (base - at) / np.linalg.norm(base - at)

@@ -61,6 +61,10 @@ def test_moves_and_touches_part_near_the_papers_threshold_and_give_a_usable_frag
     assert load(out / "bristle.toml").bristle.threshold_hpa == pytest.approx(chosen.hpa, abs=0.06)
     page = (out / "report.html").read_text()
     assert "0 of 12 moves without contact" in page
+    # Any threshold in the gap does as well: the picture called this one the best.
+    assert f"Every threshold in between parts them; {chosen.hpa:g} hPa is recommended" in page
+    assert f"{chosen.hpa:g}</b> (recommended)" in page
+    assert f"recommended: {chosen.hpa:g} hPa" in drawn[0].axes[0].get_legend_handles_labels()[1]
     # Its few moves were counted as "6 × 10⁰".
     histogram = drawn[0].axes[0]
     ticks = [*histogram.get_yticklabels(), *histogram.get_yticklabels(minor=True)]

@@ -73,11 +73,11 @@ def finding(moves: Sequence[Move], configured_hpa: float) -> str:
     chosen, now = threshold(moves), Threshold.of(configured_hpa, moves)
     free = max(move.peak_hpa for move in moves if not move.touched)
     touch = min(move.peak_hpa for move in moves if move.touched)
-    text = (
-        f"Moves without contact make up to {free:.1f} hPa, touches at least {touch:.1f} hPa. "
-        f"{chosen.hpa:g} hPa parts them"
-    )
-    text += " cleanly. " if free < touch else " best. "
+    text = f"Moves without contact make up to {free:.1f} hPa, touches at least {touch:.1f} hPa. "
+    if free < touch:
+        text += f"Every threshold in between parts them; {chosen.hpa:g} hPa is recommended. "
+    else:
+        text += f"No threshold parts them; {chosen.hpa:g} hPa makes the fewest errors. "
     return text + (
         f"At the configured {now.hpa:g} hPa {now.false} of {now.free} moves without contact count "
         f"as touches, and {now.missed} of {now.touches} touches are missed."
@@ -140,7 +140,11 @@ def picture(path: Path, log: Log) -> Path:
 def _lines(axes: Any, chosen_hpa: float, configured_hpa: float) -> None:
     axes.axvline(configured_hpa, color=palette.INK, lw=1.6, label=f"set: {configured_hpa:g} hPa")
     axes.axvline(
-        chosen_hpa, color=palette.AGREES, lw=1.8, ls=(0, (4, 2)), label=f"best: {chosen_hpa:g} hPa"
+        chosen_hpa,
+        color=palette.AGREES,
+        lw=1.8,
+        ls=(0, (4, 2)),
+        label=f"recommended: {chosen_hpa:g} hPa",
     )
 
 
@@ -202,7 +206,7 @@ def _table(moves: Sequence[Move], places: Sequence[float], chosen_hpa: float) ->
     rows = []
     for hpa in places:
         one = Threshold.of(hpa, moves)
-        name = f"<b>{hpa:g}</b> (best)" if hpa == chosen_hpa else f"{hpa:g}"
+        name = f"<b>{hpa:g}</b> (recommended)" if hpa == chosen_hpa else f"{hpa:g}"
         rows.append(
             f"<tr><td>{name}</td><td>{one.false} of {one.free}</td><td>{one.false_rate:.2%}</td>"
             f"<td>{one.missed} of {one.touches}</td><td>{one.missed_rate:.2%}</td></tr>"
