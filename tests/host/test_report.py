@@ -11,6 +11,7 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 from importlib import resources
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from setae import report
 from setae.config import load
 from setae.errors import ExtraMissingError, LogError
 from setae.record import Recorder, read
-from setae.report import animation, explore, html
+from setae.report import animation, explore, html, palette
 from setae.report.reading import load as load_trial
 from setae.servo import ServoModel
 
@@ -345,6 +346,19 @@ def test_commands_import_no_report_and_the_report_no_plotting() -> None:
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )
     assert found.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("scale", [palette.HEIGHTS[::-1], palette.AMOUNTS])
+def test_scales_of_colours_are_in_order_for_who_sees_no_colours(scale: tuple[str, ...]) -> None:
+    # From blue over yellow to red the middle was the lightest, so both ends looked alike.
+    light = [
+        sum(
+            weight * int(colour[at : at + 2], 16) ** 2.2
+            for weight, at in ((0.2126, 1), (0.7152, 3), (0.0722, 5))
+        )
+        for colour in scale
+    ]
+    assert all(darker < 0.8 * lighter for lighter, darker in pairwise(light))
 
 
 def test_an_animation_is_drawn(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ function show(index) {
       color: run.colours.ink, line: { width: 1.4 },
     }),
   ], {
-    margin: { l: 60, r: 20, t: 20, b: 50 }, paper_bgcolor: "rgba(0,0,0,0)", hovermode: "closest",
+    margin: { l: 60, r: 20, t: 20, b: 64 }, paper_bgcolor: "rgba(0,0,0,0)", hovermode: "closest",
     font: { family: "system-ui, sans-serif", size: 14, color: run.colours.ink },
     xaxis: { title: { text: `${plane.toLowerCase()} (mm)` }, zeroline: false, gridcolor: run.colours.grid },
     yaxis: { title: { text: "z (mm)" }, zeroline: false, scaleanchor: "x", gridcolor: run.colours.grid },
