@@ -172,6 +172,14 @@ const char* parameter_name(int index) {
   return index >= 0 && index < parameter_count() ? kEntries[index].name : nullptr;
 }
 
+bool parameter_range(int index, double& least, double& most) {
+  if (index < 0 || index >= parameter_count())
+    return false;
+  least = kEntries[index].least;
+  most = kEntries[index].most;
+  return true;
+}
+
 bool set_parameter(Parameters& parameters, const std::string& name, double value,
                    std::string& error) {
   const Entry* entry = find(name);

@@ -53,6 +53,8 @@ Parameters default_parameters();
 
 int parameter_count();
 const char* parameter_name(int index);  // null where there is none
+// What each may be; false where there is no such one.
+bool parameter_range(int index, double& least, double& most);
 
 // Both return false where there is no such name, or the value is no good; then
 // `error` says which parameter and what it may be.

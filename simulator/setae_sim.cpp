@@ -66,6 +66,10 @@ SETAE_EXPORT const char* setae_world_parameter_name(int index) {
   return setae::sim::parameter_name(index);
 }
 
+SETAE_EXPORT int setae_world_parameter_range(int index, double* least, double* most) {
+  return setae::sim::parameter_range(index, *least, *most) ? 0 : kBadArgument;
+}
+
 SETAE_EXPORT int setae_world_set(setae_world* world, const char* name, double value) {
   if (world->world)
     return fail(world, kWrongTime, kStarted);

@@ -52,6 +52,7 @@ const char* setae_world_error(const setae_world*);
 /* Named parameters, e.g. "spring.axial_rate_n_per_mm"; before the start only. */
 int setae_world_parameter_count(void);
 const char* setae_world_parameter_name(int index);
+int setae_world_parameter_range(int index, double* least, double* most);
 int setae_world_set(setae_world*, const char* name, double value);
 int setae_world_get(const setae_world*, const char* name, double* value);
 

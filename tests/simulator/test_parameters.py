@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from setae.cli import main
 from setae.config import load
 from setae.errors import InputError
 from setae.sim import SimulatedStage, World, parameter_names
@@ -110,3 +111,22 @@ def test_the_paper_s_configuration_and_the_simulator_s_defaults_are_the_same_rob
         assert world.get(f"servo.us_per_degree_{i}") == pytest.approx(servo.us_per_degree[i])
     world.start()
     assert SimulatedStage(world, config.stage).position_mm == (0.0, 0.0, 0.0)
+
+
+def test_all_parameters_are_listed_with_their_ranges(capsys: pytest.CaptureFixture[str]) -> None:
+    """An installed package lacks the source that the pages sent users to."""
+    with pytest.raises(SystemExit) as ended:
+        main(["plant", "paper_like"])
+    assert ended.value.code == 0
+    header, *rows = capsys.readouterr().out.splitlines()
+    assert header == "parameter,value,default,least,most"
+    table = {name: [float(v) for v in rest] for name, *rest in (row.split(",") for row in rows)}
+    assert tuple(table) == parameter_names()
+    assert table["tendon.friction"][:2] == [0.147, 0]
+    assert table["spring.mass_g"] == [25, 25, 0, 500]
+    with World() as world:
+        for name, (_, default, least, most) in table.items():
+            assert least <= default <= most
+            for beyond in (least - 1, most + 1):
+                with pytest.raises(InputError):
+                    world.set(name, beyond)

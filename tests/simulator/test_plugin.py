@@ -15,6 +15,9 @@ from setae.cli import main
 from setae.cli.common import with_plugin
 from setae.config import load
 from setae.errors import SetaeError
+from setae.experiments import runs
+from setae.record import read
+from setae.report import solving
 from setae.sim.plugin import Answer, PluginError, checked, make
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
@@ -191,3 +194,32 @@ def test_a_command_drives_a_plugin(
         main(["move", "0", "0", "60", "--sim", "python:arc_robot:nothing"])
     assert ended.value.code == 1
     assert "nothing" in capsys.readouterr().err
+
+
+def test_a_plugin_is_validated_and_its_bristle_calibrated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The tools of this robot for another: nobody knows its residual, so none is doubted."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    robot = ["--sim", "python:arc_robot:make", "--no-report", "--out"]
+    with pytest.raises(SystemExit) as ended:
+        main(["validate", "--model", "parallel", "--targets", "5", *robot, str(tmp_path / "v")])
+    assert ended.value.code == 0, capsys.readouterr().err
+    (run,) = runs.read([read(tmp_path / "v" / "parallel.mcap")])
+    assert len(run.poses) == 5
+    # An arc that is commanded as an arc; the servos' dead band is left.
+    assert np.median([pose.in_plane_mm for pose in run.poses]) < 1.0
+    assert np.isnan(run.logs[0].array("/truth", "largest_residual")).all()
+    assert solving.told(run.logs) == ""
+    with pytest.raises(SystemExit) as ended:
+        main(["calibrate", "bristle", "--moves", "4", "--touches", "3", *robot,
+              str(tmp_path / "b")])  # fmt: skip
+    assert ended.value.code == 0, capsys.readouterr().err
+    assert load(tmp_path / "b" / "bristle.toml").bristle.threshold_hpa > 0
+
+
+def test_what_a_plugin_cannot_do_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["validate", "--causes", "--sim", "python:arc_robot:make"])
+    assert ended.value.code == 1
+    assert "the simulator's own robot" in capsys.readouterr().err

@@ -14,6 +14,7 @@ from setae.rig.assembly import (
     simulator_version,
     try_simulator,
 )
+from setae.rig.parameters import simulator_table
 from setae.rig.ports import PortInfo, find_port, ports
 from setae.sim import plants
 
@@ -27,6 +28,7 @@ __all__ = [
     "plants",
     "ports",
     "simulator_parameters",
+    "simulator_table",
     "simulator_version",
     "try_simulator",
 ]

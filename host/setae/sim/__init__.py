@@ -14,7 +14,7 @@ from setae.sim.spring import Rest, Spring
 from setae.sim.stage import Follower, SimulatedStage
 from setae.sim.transport import SimTransport
 from setae.sim.truth import SOLVED, SensorFault, Truth
-from setae.sim.world import World, parameter_names
+from setae.sim.world import World, parameter_names, parameter_ranges
 
 __all__ = [
     "SOLVED",
@@ -30,6 +30,7 @@ __all__ = [
     "World",
     "add_solid",
     "parameter_names",
+    "parameter_ranges",
     "plants",
     "plugin",
 ]

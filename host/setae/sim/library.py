@@ -167,6 +167,7 @@ def load() -> ctypes.CDLL:
         "world_error": (c_char_p, (world,)),
         "world_parameter_count": (c_int, ()),
         "world_parameter_name": (c_char_p, (c_int,)),
+        "world_parameter_range": (status, (c_int, vector, vector)),
         "world_set": (status, (world, c_char_p, c_double)),
         "world_get": (status, (world, c_char_p, vector)),
         "world_add_tube": (status, (world, vector, c_double)),

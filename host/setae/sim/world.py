@@ -17,7 +17,7 @@ from setae.sim.library import CPlantInput, CPlantOutput, CTruth, PlantStep, Simu
 from setae.sim.plugin import Drive, Plant, PluginError, checked
 from setae.sim.truth import SensorFault, Truth
 
-__all__ = ["World", "parameter_names"]
+__all__ = ["World", "parameter_names", "parameter_ranges"]
 
 _BAD_ARGUMENT = -1
 _PLANT_FAILED = -5
@@ -32,6 +32,17 @@ def parameter_names() -> tuple[str, ...]:
     library = load()
     count = library.setae_world_parameter_count()
     return tuple(library.setae_world_parameter_name(i).decode() for i in range(count))
+
+
+def parameter_ranges() -> dict[str, tuple[float, float]]:
+    """Return what each parameter may be, least and most, by its name."""
+    library = load()
+    ranges = {}
+    for index, name in enumerate(parameter_names()):
+        least, most = ctypes.c_double(), ctypes.c_double()
+        library.setae_world_parameter_range(index, ctypes.byref(least), ctypes.byref(most))
+        ranges[name] = (least.value, most.value)
+    return ranges
 
 
 def _vector(name: str, values: Sequence[float] | Array) -> ctypes.Array[ctypes.c_double]:
