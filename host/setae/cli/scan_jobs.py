@@ -1,0 +1,194 @@
+"""Which scans `setae scan` does: those that are asked for, or that an earlier run left."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tomllib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from setae import record
+from setae.cli import tell
+from setae.cli.common import Where
+from setae.config import Config
+from setae.errors import InputError, LogError
+from setae.experiments import scan as scans
+from setae.experiments.scan import Mode, ScanResult
+from setae.objects import TableScene, of_description, random_object, table_scene
+
+__all__ = ["Job", "fresh", "resumed", "settings", "warn_of_no_height"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """A scan to do: how, what, and what is known of it already.
+
+    `modes` are all that the run was asked for; `replaces` are logs in which no scan has begun.
+    """
+
+    url: str | None
+    config: Config
+    mode: Mode
+    modes: tuple[Mode, ...]
+    seed: int
+    scene: TableScene | None
+    replaces: frozenset[Path] = frozenset()
+    known: ScanResult | None = None
+    part: int = 1
+    arm_base_mm: tuple[float, ...] | None = None
+
+    @property
+    def known_places(self) -> int:
+        """Of how many places something is known already."""
+        return len(self.known.places) if self.known else 0
+
+    @property
+    def name(self) -> str:
+        """Of its log."""
+        return f"{self.mode}.mcap" if self.part == 1 else f"{self.mode}-{self.part}.mcap"
+
+
+def settings(
+    where: Where, area: str | None, step: float | None, order: str | None, tallest: float | None
+) -> Config:
+    """The robot with what the options say of the scan."""
+    config = where.load()
+    changes: dict[str, object] = {}
+    if area is not None:
+        changes["area_mm"] = _area_mm(area)
+    if step is not None:
+        changes["step_mm"] = step
+    if order is not None:
+        changes["order"] = order
+    if tallest is not None:
+        if where.simulated:
+            raise InputError("--tallest tells of a real object.", "The simulator knows its own.")
+        changes["tallest_mm"] = tallest
+    return dataclasses.replace(config, scan=dataclasses.replace(config.scan, **changes))  # type: ignore[arg-type]  # each as its key has it
+
+
+def warn_of_no_height(config: Config) -> None:
+    """Say that the height window can't be checked: the configured height is all of it."""
+    window_mm = scans.window_mm(config)
+    if config.scan.tallest_mm >= window_mm:
+        tell(
+            f"Nobody said how tall the object is, so that it fits is not checked. It may rise "
+            f"{window_mm:g} mm above the extended bristle's tip; --tallest says how far it does."
+        )
+
+
+def _area_mm(text: str) -> tuple[float, float]:
+    parts = re.split(r"[x×]", text)
+    try:
+        sides = [float(part) for part in parts]
+    except ValueError:
+        sides = []
+    if len(sides) not in (1, 2):
+        raise InputError(f"--area {text!r} is no area.", "Give mm: --area 200 or --area 120x80.")
+    return sides[0], sides[-1]
+
+
+def fresh(
+    config: Config, where: Where, modes: Sequence[Mode], object_: str | None, scene: Path | None
+) -> list[Job]:
+    """Scans that the options ask for, one for each mode."""
+    if len(set(modes)) < len(modes):
+        raise InputError("A --mode is given twice.", "Give each once.")
+    url = where.url
+    place: TableScene | None = None
+    if where.simulated:
+        if object_ is not None and scene is not None:
+            raise InputError("--object and --scene exclude each other.", "Give one of them.")
+        place = _scene(config, scene) if scene else _object(config, object_ or "eraser")
+        config = scans.in_scene(config, place)
+    elif object_ is not None or scene is not None:
+        raise InputError("--object and --scene are for the simulator.", "Give --sim too.")
+    job = Job(
+        url=url, config=config, mode=modes[0], modes=tuple(modes), seed=where.seed, scene=place
+    )
+    return [dataclasses.replace(job, mode=mode) for mode in modes]
+
+
+def _object(config: Config, text: str) -> TableScene:
+    shape, _, seed = text.partition(":")
+    if shape == "none":
+        return table_scene(config)
+    if seed and not seed.isdecimal():
+        raise InputError(
+            f"--object {text!r}: {seed!r} is no seed.", "Give a whole number, as in eraser:3."
+        )
+    return table_scene(config, random_object(shape, int(seed or 0), area_mm=config.scan.area_mm))
+
+
+def _scene(config: Config, path: Path) -> TableScene:
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(
+            f"The scene {path} can't be read: {error.strerror}.", "Check the file's name."
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"The scene {path} isn't valid TOML: {error}.", "Correct that line."
+        ) from None
+    if "table_z_mm" not in data:
+        data["table_z_mm"] = table_scene(config).table_z_mm
+    try:
+        found = of_description(data)
+    except InputError as error:
+        raise InputError(f"{path}: {error.problem}", error.remedy) from error
+    if unknown := set(data) - {"table_z_mm", "object"}:
+        raise InputError(
+            f"The scene {path} has no {sorted(unknown)[0]!r}.", "It has table_z_mm and [object]."
+        )
+    return found
+
+
+def resumed(path: Path, where: Where) -> tuple[list[Job], Callable[[], Path]]:
+    """What a run left undone: scans that ended early, then modes that had not begun."""
+    found = [path] if path.is_file() else sorted(path.glob("*.mcap"))
+    if not found:
+        raise LogError(f"{path} holds no log.", "Give the folder that `setae scan` wrote.")
+    logs = [record.read(log) for log in _all_parts(found)]
+    # A run that ended while the robot was being enabled leaves a log in which no scan has begun.
+    vain = [log for log in logs if log.metadata.get("experiment") == scans.EXPERIMENT
+            and not log.events("scan_start")]  # fmt: skip
+    begun = scans.scans_of(log for log in logs if log not in vain)
+    about = logs[0].metadata
+    simulated = bool(about.get("simulated"))
+    if simulated and where.port is not None:
+        raise InputError("That scan was simulated, so --port has no part in it.", "Leave it out.")
+    plant = str(about.get("plant") or "")
+    base_mm = about.get("arm_base_mm")
+    asked = tuple(about.get("modes") or ()) if path.is_dir() or not begun else ()
+    job = Job(
+        url=(plant if plant.startswith("python:") else "sim://") if simulated else where.url,
+        config=logs[0].config,
+        mode=about["mode"],
+        modes=tuple(about.get("modes") or ()),
+        seed=int(about.get("seed") or 0),
+        scene=of_description(about.get("scene") or {}) if simulated else None,
+        replaces=frozenset(log.path for log in vain),
+        arm_base_mm=None if base_mm is None else tuple(base_mm),
+    )
+    left, modes = [], set()
+    for parts in begun:
+        known = scans.read_parts(parts)
+        modes.add(known.mode)
+        if not known.complete:
+            again = dataclasses.replace(job, mode=known.mode, known=known, part=len(parts) + 1)
+            left.append(again)
+    left += [dataclasses.replace(job, mode=mode) for mode in asked if mode not in modes]
+    if not left:
+        raise InputError(f"The scan in {path} is complete.", "`setae report` makes its report.")
+    return left, lambda: logs[0].path.parent
+
+
+def _all_parts(logs: Sequence[Path]) -> list[Path]:
+    """Of one log: the others of its scan, which lie beside it."""
+    if len(logs) > 1:
+        return list(logs)
+    stem = re.sub(r"-\d+$", "", logs[0].stem)
+    return sorted(logs[0].parent.glob(f"{stem}*.mcap"))
