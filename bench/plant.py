@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from tests.simulator import shooting
+from tests.simulator import bore, shooting
 from tests.simulator.conftest import QUIET, Driver
 
 from setae.sim import World, plants
@@ -26,6 +26,18 @@ def worst_against_shooting_mm() -> tuple[float, int]:
                 expected_mm, _ = shooting.solve(parameters, truth)
                 errors_mm.append(float(np.linalg.norm(truth.backbone_mm[-1] - expected_mm)))
     return max(errors_mm), len(errors_mm)
+
+
+def worst_in_bore_mm() -> float:
+    """Largest distance of the tip from the strong form's with tendons along the bore's wall."""
+    errors_mm = []
+    for parameters in (bore.EVEN, bore.UNEVEN):
+        with World(seed=1, parameters={**QUIET, **parameters}) as world:
+            world.start()
+            truth = Driver(world).pull(bore.POSE_MM, rest_s=0.5)
+            expected_mm, *_ = bore.solve(parameters, truth)
+            errors_mm.append(float(np.linalg.norm(truth.backbone_mm[-1] - expected_mm)))
+    return max(errors_mm)
 
 
 def step_ms() -> float:
