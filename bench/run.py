@@ -276,8 +276,8 @@ def plant() -> Iterable[Figure]:
         round(plant_figures.worst_in_bore_mm(), 4),
         "mm",
         "the same with a tendon along the wall of the bore, bent by 75 to 85 degrees with gravity,"
-        " against shooting in turns with shortest strings of a general minimiser; an even robot of"
-        " 10 elements and an uneven one of 20",
+        " against shooting in turns with shortest strings of a general minimiser; an even robot"
+        " and an uneven one",
     )
     yield Figure(
         "plant_step_ms",

@@ -54,7 +54,7 @@ PlantSettings plant_settings(const Parameters& p) {
   s.rod_elements = static_cast<int>(p.plant.rod_elements);
   s.rod_extra_modes = static_cast<int>(p.plant.rod_extra_modes);
   if (s.rod_elements == 0) {
-    s.rod_elements = changes ? 20 : 10;
+    s.rod_elements = kMaxElements;
     s.rod_extra_modes = changes ? 1 : s.rod_extra_modes;
   }
   return s;

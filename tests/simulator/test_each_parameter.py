@@ -35,7 +35,7 @@ CHANGED = {
     "bristle.filament_bow_angle_deg": 90.0,
     "line.byte_us": 40.0,
     "line.down_latency_us": 6000.0,
-    "plant.rod_elements": 20.0,
+    "plant.rod_elements": 10.0,
     "plant.rod_extra_modes": 1.0,
     "servo.dead_band_us": 20.0,
     "servo.stiffness_n_per_mm": 20.0,
