@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 __all__ = ["stop_all"]
+
+_NOTE: Final = "Stopping failed too: "
 
 
 def stop_all(error: BaseException, *stops: Callable[[], object]) -> None:
@@ -30,6 +33,10 @@ def stop_all(error: BaseException, *stops: Callable[[], object]) -> None:
         try:
             stop()
         except Exception as failure:
-            told = [str(error), *getattr(error, "__notes__", [])]
-            if not any(str(failure) in text for text in told):
-                error.add_note(f"Stopping failed too: {failure}")
+            note = _NOTE + _text(failure)
+            if note not in {_NOTE + _text(error), *getattr(error, "__notes__", [])}:
+                error.add_note(note)
+
+
+def _text(error: BaseException) -> str:
+    return str(error) or type(error).__name__
