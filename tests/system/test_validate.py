@@ -21,10 +21,10 @@ from setae.config import load
 from setae.experiments import causes, runs
 from setae.experiments.accuracy import Pose
 from setae.experiments.events import Event
-from setae.experiments.targets import choose, paper_targets
+from setae.experiments.targets import Target, choose, paper_targets
 from setae.experiments.validate import Noise, measured, validate
 from setae.link.session import Session
-from setae.report.causes import picture, section
+from setae.report.causes import note_of, picture, section
 from setae.report.validation_pictures import bubbles_picture
 from setae.robot import Robot
 from setae.scene import open_scene
@@ -308,6 +308,33 @@ def test_causes_go_on_where_they_were_interrupted(
     code, _, errors = run(capsys, *more, "--resume")
     assert code == 1
     assert "another targets" in errors
+
+
+def test_causes_are_compared_over_the_targets_that_all_plants_have(tmp_path: Path) -> None:
+    """A plant without a solution at its worst target counted as better; one without any as NaN."""
+    near, far = paper_targets(load())[9:11]
+
+    def pose(target: Target, error_mm: float) -> Pose:
+        return Pose(target, target.position_mm + np.array([0.0, 0.0, error_mm]))
+
+    def study(name: str, mended: list[Pose], unsolved: list[str]) -> record.Log:
+        path = tmp_path / name
+        with record.Recorder(path, metadata={"config": load().to_toml()}) as recorder:
+            for number, case in enumerate(causes.cases({"slip": {}}, "paper", ["paper"])):
+                found = [pose(near, 1.0), pose(far, 9.0)]
+                data = causes.told(case, found)
+                if case.name == "mended slip":
+                    data = causes.told(case, mended, unsolved)
+                recorder.experiment(number, "case", data)
+        return record.read(path)
+
+    log = study("one.mcap", [pose(near, 1.0)], [far.label])
+    assert {effect.gains_mm for effect in causes.effects(log)} == {0.0}
+    assert f"{far.label} (mended slip)" in causes.left_out(log)
+    assert "1 of 145 targets" in note_of(log)
+    log = study("none.mcap", [], [near.label, far.label])
+    assert causes.effects(log) == ()
+    assert "No target is left" in causes.left_out(log)
 
 
 def _picture(folder: Path, effects: Sequence[causes.Effect]) -> Path:

@@ -15,6 +15,7 @@ from setae.experiments import causes as why
 from setae.experiments import runs
 from setae.experiments.accuracy import Pose, Spread, by_group
 from setae.experiments.targets import Target, commanded_lengths_mm
+from setae.record import Log
 from setae.wording import counted
 
 __all__ = ["print_causes", "print_runs", "print_targets"]
@@ -71,8 +72,11 @@ def _table(poses: Sequence[Pose]) -> Table:
     return table
 
 
-def print_causes(effects: Sequence[why.Effect]) -> None:
+def print_causes(study: Log) -> None:
     """Print what each imperfection does; nothing where the study ended early."""
+    effects = why.effects(study)
+    if text := why.left_out(study):
+        say(text)
     if not effects:
         return
     say("What each imperfection does to the mean error in the bending plane, in mm:")

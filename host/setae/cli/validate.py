@@ -137,7 +137,7 @@ def validate_command(
     found = runs.read(runs.of_kind(read, runs.EXPERIMENT))
     print_runs(found)
     for log in runs.of_kind(read, why.EXPERIMENT):
-        print_causes(why.effects(log))
+        print_causes(log)
     say(f"Logs: {folder}")
     if report and any(run.poses for run in found):
         write_report(logs, folder)
@@ -389,9 +389,4 @@ def _study(
 
                 look = _look(opened, noise, miss)
                 poses = validate(opened.robot, targets, look, model=case.model)
-            recorder.experiment(number * 1_000_000, "case", why.told(case, poses))
-            if missed:
-                say(
-                    f"{case.name}: not measured, for the simulated spring had no solution there: "
-                    f"{', '.join(missed)}."
-                )
+            recorder.experiment(number * 1_000_000, "case", why.told(case, poses, missed))

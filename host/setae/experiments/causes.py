@@ -12,11 +12,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+import numpy as np
+
 from setae.errors import InputError
 from setae.experiments.accuracy import OVERALL, Pose, by_group
 from setae.record import Log
 
-__all__ = ["EXPERIMENT", "Case", "Effect", "cases", "effects", "known", "told"]
+__all__ = [
+    "EXPERIMENT", "Case", "Effect", "cases", "compared", "effects", "known", "left_out", "told"
+]  # fmt: skip
 
 EXPERIMENT: Final = "causes"
 """What the metadata of such a log names."""
@@ -63,6 +67,8 @@ class Case:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
     """What a cause does to the mean error in the bending plane, in mm.
+
+    All means are of the same targets: those that were measured on each plant.
 
     Attributes
     ----------
@@ -142,8 +148,18 @@ def _case(
     return Case(kind=kind, cause=cause, model=model, parameters=parameters)
 
 
-def told(case: Case, poses: Sequence[Pose]) -> dict[str, Any]:
-    """What a log keeps of a case."""
+def told(case: Case, poses: Sequence[Pose], unsolved: Sequence[str] = ()) -> dict[str, Any]:
+    """What a log keeps of a case.
+
+    Parameters
+    ----------
+    case
+        The plant.
+    poses
+        What was measured on it.
+    unsolved
+        Labels of the targets that were not, because the simulated spring had no solution there.
+    """
     whole = by_group(poses)[OVERALL].in_plane
     return {
         "kind": case.kind,
@@ -153,6 +169,8 @@ def told(case: Case, poses: Sequence[Pose]) -> dict[str, Any]:
         "targets": len(poses),
         "mean_mm": whole.mean_mm,
         "sd_mm": whole.sd_mm,
+        "errors_mm": {pose.target.label: pose.in_plane_mm for pose in poses},
+        "unsolved": list(unsolved),
     }
 
 
@@ -174,10 +192,41 @@ def known(log: Log, metadata: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]
             for case in log.events("case")}  # fmt: skip
 
 
+def compared(log: Log) -> tuple[str, ...]:
+    """Read the labels of the targets that were measured on every plant."""
+    each = [event.data.get("errors_mm", {}) for event in log.events("case")]
+    return tuple(label for label in each[0] if all(label in row for row in each)) if each else ()
+
+
+def left_out(log: Log) -> str:
+    """Say which targets are compared on no plant, and on which they have no solution; or nothing.
+
+    A mean over fewer targets would not compare with the others.
+    """
+    where: dict[str, list[str]] = {}
+    for event in log.events("case"):
+        for label in event.data.get("unsolved", ()):
+            name = f"{event.data['kind']} {event.data['cause']}".strip()
+            where.setdefault(str(label), []).append(name)
+    if not where:
+        return ""
+    parts = "; ".join(f"{label} ({', '.join(names)})" for label, names in where.items())
+    rest = "" if compared(log) else " No target is left to compare them by."
+    return f"Left out, for the simulated spring had no solution there: {parts}.{rest}"
+
+
 def effects(log: Log) -> tuple[Effect, ...]:
-    """Read the effects from a log, what gains most first; empty where it ended early."""
+    """Read the effects from a log, what gains most first.
+
+    Empty where the study ended early, or no target was measured on every plant.
+    """
+    labels = compared(log)
+    if not labels:
+        return ()
     mean_mm = {
-        (str(event.data["kind"]), str(event.data["cause"])): float(event.data["mean_mm"])
+        (str(event.data["kind"]), str(event.data["cause"])): float(
+            np.mean([event.data["errors_mm"][label] for label in labels])
+        )
         for event in log.events("case")
     }
     if ("none", "") not in mean_mm or ("all", "") not in mean_mm:

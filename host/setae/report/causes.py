@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from setae.experiments.causes import MODEL, Effect
+from setae.experiments.causes import MODEL, Effect, compared
 from setae.experiments.targets import paper_targets
 from setae.record import Log
 from setae.report import extras, palette, style, template
@@ -21,8 +21,8 @@ _ADD = palette.BRISTLE
 
 def note_of(study: Log) -> str:
     """Say where a study is from, and how many of the paper's targets its means are of."""
-    driven, of_all = study.events("case")[0].data["targets"], len(paper_targets(study.config))
-    return f"Simulated, plant {study.metadata.get('plant')}, {driven} of {of_all} targets."
+    means_of, of_all = len(compared(study)), len(paper_targets(study.config))
+    return f"Simulated, plant {study.metadata.get('plant')}, {means_of} of {of_all} targets."
 
 
 def picture(path: Path, effects: Sequence[Effect], note: str) -> Path:
@@ -91,8 +91,8 @@ _NOTE = (
 )
 
 
-def section(effects: Sequence[Effect], drawn: Path) -> str:
-    """Return the page's part about causes."""
+def section(effects: Sequence[Effect], drawn: Path, left_out: str = "") -> str:
+    """Return the page's part about causes, with a word on targets that its means leave out."""
     first = effects[0]
     rows = [("none at all", f"{first.none_mm:.2f}", "", "", "")]
     rows += [
@@ -115,7 +115,7 @@ def section(effects: Sequence[Effect], drawn: Path) -> str:
     return (
         '<h2 id="causes">What to mend first</h2>'
         f'<p class="lead"><b>{html.escape(finding(effects))}</b></p>'
-        f'<p class="note">{_NOTE}</p>'
+        f'<p class="note">{_NOTE} {html.escape(left_out)}</p>'
         '<div class="scroll"><table><thead><tr><th>cause</th><th>it alone</th><th>adds</th>'
         "<th>all but it</th><th>mending gains</th></tr></thead>"
         f"<tbody>{body}</tbody></table></div>"

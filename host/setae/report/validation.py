@@ -64,7 +64,8 @@ def write(
             if effects := causes.effects(study):
                 drawn_to = folder / "pictures" / "causes.png"
                 chart = why.picture(drawn_to, effects, why.note_of(study))
-                section, drawn = why.section(effects, chart), (*drawn, chart)
+                section = why.section(effects, chart, causes.left_out(study))
+                drawn = (*drawn, chart)
         text = validation_page.page(shown, drawn, section)
         (folder / page).write_text(text, encoding="utf-8")
         tables = (folder / "targets.csv", folder / "summary.csv")
