@@ -112,7 +112,7 @@ def rests() -> Iterator[str]:
             unsettled = sum(bool(rests.unsettled) for rests in found)
             yield (
                 f"{plant}: of {len(sets_mm)} sets {what}, {several} let it rest in several ways;"
-                f" in {unsettled} a start did not settle"
+                f" in {unsettled} a start found no stable rest"
             )
 
 

@@ -82,7 +82,8 @@ class Rests(tuple[Rest, ...]):
     Attributes
     ----------
     unsettled : tuple of Start
-        From where the spring was let go and found no equilibrium: what lies there is unknown.
+        From where the spring was let go and found no stable equilibrium, or none at all: what lies
+        there is unknown.
     """
 
     unsettled: tuple[Start, ...]
@@ -187,13 +188,13 @@ class Spring:
     def rests(self, lengths_mm: Sequence[float] | Array) -> Rests:
         """Search all stable rests at some tendon lengths, lowest energy first.
 
-        From 25 starts, bent to all sides and with the top moved to all sides. A search is no
-        proof: what none of them leads to is not found.
+        From 21 starts: straight, bent to all sides, with the top moved to all sides, and both.
+        A search is no proof: what none of them leads to is not found.
 
         Returns
         -------
         Rests
-            A tuple of them, and in ``unsettled`` the starts from which it found no equilibrium.
+            A tuple of them, and in ``unsettled`` the starts from which it found no stable one.
 
         Raises
         ------
@@ -207,9 +208,9 @@ class Spring:
         starts += [Start((x, y), (y / 4, -x / 4)) for x, y in product((-60.0, 60.0), (-60.0, 60.0))]
         for start in dict.fromkeys(starts):
             rest = self._rest(lengths_mm, start)
-            if not rest.residual < SOLVED:
+            if not (rest.residual < SOLVED and rest.stable):
                 unsettled.append(start)
-            elif rest.stable and not any(rest.same_as(other) for other in found):
+            elif not any(rest.same_as(other) for other in found):
                 found.append(rest)
         return Rests(found, unsettled)
 
