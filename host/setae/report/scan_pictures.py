@@ -53,7 +53,7 @@ def clouds_picture(path: Path, scans: Sequence[Scan]) -> None:
         width = 6.0 / figure.get_figwidth()
         for index, scan in enumerate(scans):
             axes = figure.add_axes((index * width, 0.0, width, 0.84), projection="3d")
-            cloud_axes(axes, scan, _range_mm(scans))
+            cloud_axes(axes, scan, scans)
             axes.set_title(title(scan), y=0.96)
         _height_bar(figure, 1 - 0.95 / figure.get_figwidth(), scans)
         style.save(figure, path, dpi=120)
@@ -68,7 +68,7 @@ def overview_picture(path: Path, scans: Sequence[Scan]) -> None:
         style.headline(figure, "The same object felt in two modes", _note(scans, points))
         for index, scan in enumerate(scans[:2]):
             axes = figure.add_axes((0.36 * index, -0.03, 0.36, 0.92), projection="3d")
-            cloud_axes(axes, scan, _range_mm(scans))
+            cloud_axes(axes, scan, scans)
             axes.set_title(title(scan), y=0.93)
         _height_bar(figure, 0.755, scans)
         bars = figure.add_axes((0.85, 0.16, 0.14, 0.62))
@@ -84,16 +84,17 @@ def overview_picture(path: Path, scans: Sequence[Scan]) -> None:
         style.save(figure, path, dpi=130)
 
 
-def cloud_axes(axes: Any, scan: Scan, range_mm: tuple[float, float]) -> None:
-    """Draw the cloud of a scan into three-dimensional axes; colours span a range of heights."""
+def cloud_axes(axes: Any, scan: Scan, beside: Sequence[Scan]) -> None:
+    """Draw the cloud of a scan into three-dimensional axes, with the axes and colours of all."""
     points, inferred = cloud(scan)
+    range_mm = _range_mm(beside)
     for chosen, size in ((~inferred, 26), (inferred, 9)):
         axes.scatter(
             *points[chosen].T, c=points[chosen, 2], s=size, depthshade=False,
             cmap=style.colours(palette.HEIGHTS), vmin=range_mm[0], vmax=range_mm[1],
             edgecolors=palette.PAPER, linewidths=0.3,
         )  # fmt: skip
-    low, high = _box(scan, points)
+    low, high = _box(beside)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(tuple(high - low), zoom=0.88)
     axes.set_xlabel("x (mm)", labelpad=6)
@@ -131,17 +132,19 @@ def _height_bar(figure: Any, left: float, scans: Sequence[Scan]) -> None:
     figure.colorbar(scale, cax=axes).set_label(f"height {scans[0].above} (mm)")
 
 
-def _box(
-    scan: Scan, points: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of what is shown of a cloud: the points, with some room around them."""
-    grid = scan.result.height_map
-    square_mm = np.array([[grid.x_mm[0], grid.y_mm[0]], [grid.x_mm[-1], grid.y_mm[-1]]])
-    shown = points[:, :2] if len(points) else square_mm
+def _box(scans: Sequence[Scan]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of what is shown of clouds side by side: all points, with some room around them."""
+    shown = np.concatenate([cloud(scan)[0][:, :2] for scan in scans])
+    if not len(shown):
+        grids = [scan.result.height_map for scan in scans]
+        ends = [[(grid.x_mm[i], grid.y_mm[i]) for i in (0, -1)] for grid in grids]
+        shown = np.concatenate([np.array(some) for some in ends])
     low, high = shown.min(axis=0), shown.max(axis=0)
-    half = max(float((high - low).max()) / 2 + scan.config.scan.step_mm, 10.0)
+    step_mm = max(scan.config.scan.step_mm for scan in scans)
+    half = max(float((high - low).max()) / 2 + step_mm, 10.0)
     middle = (low + high) / 2
-    return np.array([*(middle - half), 0.0]), np.array([*(middle + half), max(top_mm(scan), 10.0)])
+    top = max(10.0, *(top_mm(scan) for scan in scans))
+    return np.array([*(middle - half), 0.0]), np.array([*(middle + half), top])
 
 
 def cloud(scan: Scan) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
