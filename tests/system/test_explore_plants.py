@@ -84,6 +84,9 @@ def test_a_miss_is_laid_at_the_imperfection_that_did_it(tmp_path: Path) -> None:
     assert backlash.size_mm < 0.15 * offsets.size_mm
     assert "moved it: zero offsets" in shifts.sentence(aside)
     assert "<td>zero offsets</td>" in shifts.table([aside])
+    one = dataclasses.replace(aside.shifts, each=(offsets,), untold=("backlash",))
+    told = shifts.sentence(dataclasses.replace(aside, shifts=one))
+    assert "Nothing is known of backlash" in told
     # Of a log that is not of this robot nothing is told.
     row.trial.log.metadata["plant_parameters"] = {"tendon.offset_mm_0": -3.0}
     assert shifts.look(row) is None

@@ -63,12 +63,16 @@ class Shifts:
         The loudest pressure by motion of the last half second.
     each
         What moves it furthest first.
+    untold
+        Causes of which nothing is known: without them, or with them alone, the simulated spring
+        finds no equilibrium.
     """
 
     tip_mm: Floats
     ideal_mm: Floats
     loudest_hpa: float
     each: tuple[Shift, ...]
+    untold: tuple[str, ...] = ()
 
 
 def find(parameters: Mapping[str, float], seed: int, pulse_us: ArrayLike) -> Shifts:
@@ -87,7 +91,7 @@ def find(parameters: Mapping[str, float], seed: int, pulse_us: ArrayLike) -> Shi
     Returns
     -------
     Shifts
-        Without a cause where the spring finds no equilibrium.
+        With the causes of which it can tell nothing by name.
 
     Raises
     ------
@@ -106,12 +110,14 @@ def find(parameters: Mapping[str, float], seed: int, pulse_us: ArrayLike) -> Shi
     here = replay.play(parameters, seed, pulse_us)
     ideal = replay.play(common, seed, pulse_us)
     each = []
+    untold = []
     for cause, part in parts.items():
         without = {name: value for name, value in parameters.items() if name not in part}
         try:
             mended = replay.play(without, seed, pulse_us)
             alone = replay.play({**common, **part}, seed, pulse_us)
         except SetaeError:
+            untold.append(cause)
             continue
         each.append(
             Shift(
@@ -127,4 +133,5 @@ def find(parameters: Mapping[str, float], seed: int, pulse_us: ArrayLike) -> Shi
         ideal_mm=ideal.tip_mm,
         loudest_hpa=here.loudest_hpa,
         each=tuple(each),
+        untold=tuple(untold),
     )

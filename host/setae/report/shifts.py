@@ -158,20 +158,31 @@ def sentence(aside: Aside) -> str:
     if aside.jerk:
         each = sorted(shifts.each, key=lambda shift: shift.without_hpa)
         parts = [f"{shift.without_hpa:.1f} hPa ({shift.cause})" for shift in each]
+        mended = f" Were one imperfection mended, the same pulses would make {', '.join(parts)}."
         return (
             f"{aside.when}: motion alone made {shifts.loudest_hpa:.1f} hPa, and"
-            f" {aside.trial.threshold_hpa:g} count as a touch. Were one imperfection mended, the"
-            f" same pulses would make {', '.join(parts)}."
+            f" {aside.trial.threshold_hpa:g} count as a touch."
+            f"{mended if parts else ''}{_untold(shifts)}"
         )
     whole_mm = shifts.tip_mm - shifts.ideal_mm
     each = [shift for shift in shifts.each if shift.size_mm >= _TOLD_MM]
     parts = [_part(aside, shift) for shift in each]
     if len(each) < len(shifts.each):
         parts.append(f"each other less than {_TOLD_MM:g} mm")
+    moved = f" What each imperfection moved it: {', '.join(parts)}."
     return (
         f"{aside.when}: the bristle’s tip was {np.linalg.norm(whole_mm):.1f} mm from where the "
-        f"same pulses put that of the plant ideal{_sideways(aside.outwards_mm(whole_mm))}. What "
-        f"each imperfection moved it: {', '.join(parts)}."
+        f"same pulses put that of the plant ideal{_sideways(aside.outwards_mm(whole_mm))}."
+        f"{moved if parts else ''}{_untold(shifts)}"
+    )
+
+
+def _untold(shifts: Shifts) -> str:
+    if not shifts.untold:
+        return ""
+    return (
+        f" Nothing is known of {' and '.join(shifts.untold)}: the same pulses leave the simulated "
+        "spring without an equilibrium where it is not there, or alone."
     )
 
 

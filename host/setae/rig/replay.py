@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from setae.sim import World
+from setae.sim import SimulationError, World
 
 __all__ = ["Played", "play"]
 
@@ -49,7 +49,7 @@ def play(parameters: Mapping[str, float], seed: int, pulse_us: ArrayLike) -> Pla
     Raises
     ------
     SimulationError
-        The spring has no equilibrium.
+        The spring has no equilibrium, on the way or in the end.
     """
     with World(seed=seed, parameters={**dict(parameters), **_QUIET}) as world:
         world.start()
@@ -66,6 +66,10 @@ def play(parameters: Mapping[str, float], seed: int, pulse_us: ArrayLike) -> Pla
             for servo, width_us in enumerate(row):
                 world.pulse(servo, width_us)
         lately = round(_LATELY_S * 1e6 / sample_us)
-        return Played(
-            tip_mm=np.array(world.truth().filament_mm[1]), loudest_hpa=max(heard_hpa[-lately:])
-        )
+        truth = world.truth()
+        if not truth.solved:  # then the tip is anywhere
+            raise SimulationError(
+                "The spring has no equilibrium where these pulses end.",
+                "Play more of them, or fewer.",
+            )
+        return Played(tip_mm=np.array(truth.filament_mm[1]), loudest_hpa=max(heard_hpa[-lately:]))
