@@ -18,7 +18,7 @@ import pytest
 
 from setae.cli import main
 from setae.errors import ConfigError, InputError, SetaeError
-from setae.experiments import study
+from setae.experiments import samples, study
 from setae.experiments.study import Outcome, Run, conduct, perform
 
 # Four places of a bare table: a tenth of a second of computing.
@@ -233,7 +233,9 @@ def test_a_file_says_the_same_as_options(tmp_path: Path) -> None:
     runs = study.load(file).runs()
     assert len(runs) == 2 * 2 * 2 * 2
     assert runs[-1].object == "none"
-    assert dict(runs[-1].changes) == {"simulator.plant_name": "paper_like", "scan.step_mm": 20}
+    assert dict(runs[-1].changes) == {
+        "simulator.plant_name": "paper_like", "scan.step_mm": 20, "bristle.threshold_hpa": 12,
+    }  # fmt: skip
     assert "threshold_hpa = 12.0" in runs[0].config
     file.write_text("[study]\nsaeds = 3\n")
     with pytest.raises(InputError, match="saeds"):
@@ -294,6 +296,24 @@ def test_the_table_holds_the_runs_of_all_calls_into_its_folder(
     page = (tmp_path / "report.html").read_text()
     assert "3 of 3 runs done" in page
     assert "adaptive, area_mm [20, 20], step_mm 10<" in page
+
+
+def test_runs_of_two_robots_in_one_folder_are_told_apart(tmp_path: Path) -> None:
+    # Their lines were equal in object, seed, mode and every column of the configuration, and the
+    # report made one combination of them.
+    robot = tmp_path / "robot.toml"
+    for step_mm in (20, 10):
+        robot.write_text(f"[scan]\nstep_mm = {step_mm}\n[simulator]\nplant_name = 'paper_like'\n")
+        call("--config", str(robot), "--workers", "1", "--out", str(tmp_path / "study"))
+    rows = study.read_table(tmp_path / "study/table.parquet")
+    assert [row["scan.step_mm"] for row in rows] == [None, 20], "the paper's is 10"
+    page = (tmp_path / "study/report.html").read_text()
+    for case in ("", ", step_mm 20"):  # what all have is left out
+        assert f"<td>adaptive, area_mm [20, 20]{case}</td>" in page
+    # It was said of each that its plant was the ideal one.
+    assert {one.origin for one in samples.read(tmp_path / "study")} == {
+        "simulated, plant paper_like, mode adaptive"
+    }
 
 
 @pytest.mark.parametrize(

@@ -53,8 +53,10 @@ def write(
         Matplotlib isn't installed.
     """
     folder = Path(out)
-    # Runs of other calls in the same folder may vary other keys: a name with a dot is one.
-    varied = list(dict.fromkeys([*varied, *(key for row in rows for key in row if "." in key)]))
+    # Runs of other calls in the same folder may differ in other keys: a name with a dot is one.
+    keys = dict.fromkeys(key for row in rows for key in row if "." in key)
+    differ = [key for key in keys if len({_shown(row.get(key)) for row in rows}) > 1]
+    varied = list(dict.fromkeys([*varied, *differ]))
     drawn: list[Path] = []
     with files.writing(folder):
         pictures = files.pictures_of(folder)
@@ -79,6 +81,8 @@ def _short(key: str) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
+    if isinstance(value, list):
+        return f"[{', '.join(_shown(one) for one in value)}]"
     return str(value)
 
 

@@ -42,7 +42,8 @@ class Run:
     mode
         Of the scan.
     changes
-        Keys of the configuration that the study varies, with this run's values.
+        Keys of the configuration that the study varies, and those that differ from the paper's
+        robot, with this run's values, as a file has them.
     config
         The whole configuration, as TOML.
     keep_log
@@ -129,7 +130,14 @@ class Plan:
     def runs(self) -> tuple[Run, ...]:
         """All runs: objects first, then seeds, modes and changes."""
         found = []
-        configs = [(c, robot.replaced(self.config, c).to_toml()) for c in self._combinations()]
+        varied = self.varied
+        texts = [robot.replaced(self.config, c).to_toml() for c in self._combinations()]
+        paper = _keys(robot.load().to_toml())
+        # Studies of several robots share a folder, so what they don't vary counts too.
+        configs = [
+            ({k: v for k, v in _keys(text).items() if k in varied or v != paper.get(k)}, text)
+            for text in texts
+        ]
         for shape, seed, mode in itertools.product(self.objects, self.seeds, self.modes):
             for changes, config in configs:
                 found.append(_run(shape, seed, mode, changes, config, keep_log=self.keep_logs))
@@ -211,7 +219,7 @@ def of_options(
     --------
     >>> plan = of_options(objects=["orange"], seeds=2, vary=["scan.step_mm=10,20"])
     >>> [(run.seed, run.changes) for run in plan.runs()][:2]
-    [(0, (('scan.step_mm', 10),)), (0, (('scan.step_mm', 20),))]
+    [(0, (('scan.step_mm', 10.0),)), (0, (('scan.step_mm', 20.0),))]
     """
     given: dict[str, Any] = {}
     for name, values in (("objects", objects), ("modes", modes), ("plants", plants)):
@@ -261,6 +269,10 @@ def _seeds(given: Any) -> tuple[int, ...]:
 
 def _listed(value: Any) -> tuple[Any, ...]:
     return tuple(value) if isinstance(value, list) else (value,)
+
+
+def _keys(config: str) -> dict[str, Any]:
+    return dict(_flat(tomllib.loads(config)))
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
