@@ -54,6 +54,18 @@ def test_a_wrong_scale_of_one_group_is_told() -> None:
     assert "The positions of +Y are 0.90 times as far" in told[0]
 
 
+@pytest.mark.parametrize("low_mm", [4.0, -6.0])
+def test_positions_that_are_all_too_low_are_laid_at_the_origin(low_mm: float) -> None:
+    """The scale was blamed, which would have explained less."""
+    for targets in (TARGETS, choose(TARGETS, 20)):
+        good = poses(targets, (1, 1, 1), 0.5)
+        (told,) = frames.doubts([Pose(p.target, p.position_mm - [0, 0, low_mm]) for p in good])
+        assert "check the origin" in told
+        assert "sideways" in told
+        z_mm = float(told.split(" mm in z")[0].split()[-1])
+        assert z_mm == pytest.approx(-low_mm, abs=0.2)
+
+
 def test_few_positions_prove_nothing() -> None:
     assert frames.doubts(poses(TARGETS[9:11], (-1, 1, 1), 0.0)) == ()
 

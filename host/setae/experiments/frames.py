@@ -1,7 +1,7 @@
 """Whether measured positions would fit their targets clearly better in another frame.
 
-A frame that is mirrored, or a scale that is wrong, gives errors that look like a robot's. No
-robot errs so: each of its poses on the other side, or all by the same factor.
+A frame that is mirrored, or whose scale or origin is wrong, gives errors that look like a robot's.
+Hardly a robot errs so: each of its poses on the other side, or all by the same factor or way.
 """
 
 from __future__ import annotations
@@ -20,15 +20,18 @@ __all__ = ["doubts"]
 
 _POSES: Final = 3  # of a group, at least: one may be a slip
 _SCALE_OFF: Final = 0.05
-# What is left of the median error where another frame is clearly the better one. Simulated robots
-# in a good frame keep 0.87 and more where their scale seems to be off.
+# What is left of the median error where another frame is clearly the better one.
 _LEFT_MIRRORED: Final = 0.8
 _LEFT_SCALED: Final = 0.8
 _LEFT_SCALED_GROUP: Final = 0.6  # fewer poses, and a robot may err to one side as if scaled
+# A shift looks like a scale, for all heights are positive: the scale must leave this much less.
+_LEFT_OF_SHIFTED: Final = 0.8
 
 
 def doubts(poses: Sequence[Pose]) -> tuple[str, ...]:
-    """Say which groups fit better mirrored or scaled; empty where none does.
+    """Say which groups fit better mirrored, scaled or shifted; empty where none does.
+
+    A shift alone is no reason for doubt: robots hang aside, too.
 
     Parameters
     ----------
@@ -59,22 +62,15 @@ def doubts(poses: Sequence[Pose]) -> tuple[str, ...]:
     if not planes:
         return tuple(told)
     whole = _Plane(*(np.concatenate(part) for part in zip(*planes.values(), strict=True)))
-    scaled = (
-        {"": whole}
-        if whole.scaled(_LEFT_SCALED)
-        else {
-            f" of {group}": plane
+    if whole.seems_scaled(_LEFT_SCALED):
+        told.append(whole.wrong("", _LEFT_SCALED))
+    else:
+        told += [
+            plane.wrong(f" of {group}", _LEFT_SCALED_GROUP)
             for group, plane in planes.items()
-            if group in COUPLED and plane.scaled(_LEFT_SCALED_GROUP)
-        }
-    )
-    for name, plane in scaled.items():
-        told.append(
-            f"The positions{name} are {plane.factor:.2f} times as far from the origin as their "
-            f"targets, which explains {1 - plane.left_scaled:.0%} of the median error: check the "
-            "scale."
-        )
-    return tuple(told)
+            if group in COUPLED and plane.seems_scaled(_LEFT_SCALED_GROUP)
+        ]
+    return tuple(text for text in told if text)
 
 
 class _Plane(NamedTuple):
@@ -120,7 +116,35 @@ class _Plane(NamedTuple):
         """Median error."""
         return float(np.median(np.linalg.norm(self.found_mm - self.wanted_mm, axis=1)))
 
-    def scaled(self, left: float) -> bool:
+    @property
+    def shift_mm(self) -> FloatArray:
+        """By how much they are off sideways and in z, by the median, (2,)."""
+        return np.asarray(np.median(self.found_mm - self.wanted_mm, axis=0))
+
+    @property
+    def left_shifted(self) -> float:
+        """What is left of the median error where that shift is taken out."""
+        shifted = _Plane(self.wanted_mm + self.shift_mm, self.found_mm)
+        return shifted.median_mm / self.median_mm if self.median_mm else 1.0
+
+    def seems_scaled(self, left: float) -> bool:
         """Whether these fit clearly better with another scale."""
         enough = len(self.wanted_mm) >= _POSES
         return enough and abs(self.factor - 1) > _SCALE_OFF and self.left_scaled < left
+
+    def wrong(self, name: str, left: float) -> str:
+        """Say whether it is the scale or the origin; empty where neither is clear."""
+        if self.left_scaled < _LEFT_OF_SHIFTED * self.left_shifted:
+            return (
+                f"The positions{name} are {self.factor:.2f} times as far from the origin as their "
+                f"targets, which explains {1 - self.left_scaled:.0%} of the median error: check "
+                "the scale."
+            )
+        if self.left_shifted < left:
+            sideways_mm, z_mm = self.shift_mm
+            return (
+                f"The positions{name} are off by {sideways_mm:+.1f} mm sideways and {z_mm:+.1f} mm "
+                f"in z, which explains {1 - self.left_shifted:.0%} of the median error: check the "
+                "origin."
+            )
+        return ""
