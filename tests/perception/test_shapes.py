@@ -74,7 +74,10 @@ def test_a_shape_that_was_never_seen_is_unknown(vectors: FloatArray) -> None:
 
 def test_a_scan_in_between_is_less_sure_than_one_near_its_kind(model: Model) -> None:
     # Nearly every answer was 100 % sure, also two fifths of the way to another shape.
-    for one, other in itertools.combinations(range(len(SHAPES)), 2):
+    # And each pair was tried one way only, without a lower bound: four of the twenty ways are far
+    # below the 60 % that was said of all.
+    near_pairs = {("lidded_container", "open_container"), ("lidded_container", "orange")}
+    for one, other in itertools.permutations(range(len(SHAPES)), 2):
         ways = [
             model.answer((1 - part) * model.means[one] + part * model.means[other])
             for part in (0.0, 0.2, 0.4)
@@ -82,7 +85,9 @@ def test_a_scan_in_between_is_less_sure_than_one_near_its_kind(model: Model) -> 
         near, farther, between = (answer.shares[model.shapes[one]] for answer in ways)
         assert near > 0.95
         assert near > farther > between
-        assert between < 0.85
+        pair = tuple(sorted((model.shapes[one], model.shapes[other])))
+        low, high = (0.18, 0.33) if pair in near_pairs else (0.55, 0.71)
+        assert low < between < high, pair
         assert sum(ways[0].shares.values()) == pytest.approx(1)
     assert model.answer(model.means[0]).shape == model.shapes[0]
 

@@ -271,12 +271,12 @@ def _sharpness(model: Model, log_densities: FloatArray, right: NDArray[np.int64]
     shapes = len(model.shapes)
     if shapes == 1:
         return 1.0
-    hits = len(right)
-    if not hits:  # one scan of each: nobody has tried
+    tried = len(right)
+    if not tried:  # one scan of each: nobody has tried
         log_densities = np.stack([model._distances(mean)[1] for mean in model.means])
         right = np.arange(shapes)
-    aim = np.full(log_densities.shape, 1 / (hits + 2) / (shapes - 1))
-    aim[np.arange(len(right)), right] = (hits + 1) / (hits + 2)
+    aim = np.full(log_densities.shape, 1 / (tried + 2) / (shapes - 1))
+    aim[np.arange(len(right)), right] = (tried + 1) / (tried + 2)
     # The likelihood has one maximum, and its slope falls: it is halved in.
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
