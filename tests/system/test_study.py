@@ -10,19 +10,25 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from setae.cli import main
 from setae.errors import ConfigError, InputError, SetaeError
 from setae.experiments import samples, study
 from setae.experiments.study import Outcome, Run, conduct, perform
+from setae.objects import random_object
 
 # Four places of a bare table: a tenth of a second of computing.
 SMALL = ["scan.area_mm=[20,20]", "scan.step_mm=20"]
+# Nine places with an object in their middle: what stands on the table has to come along too.
+OBJECT = {"objects": ["orange"], "vary": ["scan.area_mm=[140,140]", "scan.step_mm=70"]}
 # So far above what it steps over the retracted bristle can't be.
 TALL = "scan.clearance_mm=5,60"
 
@@ -65,7 +71,7 @@ def test_a_table_has_a_line_for_each_run(tmp_path: Path) -> None:
 
 
 def test_processes_share_the_runs_and_give_what_one_gives(tmp_path: Path) -> None:
-    runs = plan(seeds=3).runs()
+    runs = plan(seeds=3, **OBJECT).runs()
     alone = conduct(runs, tmp_path / "alone", workers=1)
     with socket.socket() as other:
         # A second study on the machine failed: dask's usual port was taken.
@@ -73,6 +79,7 @@ def test_processes_share_the_runs_and_give_what_one_gives(tmp_path: Path) -> Non
             other.bind(("127.0.0.1", 8787))
             other.listen()
         together = conduct(runs, tmp_path / "together", workers=2)
+    assert all(row["status"] == "done" and row["touched"] > 0 for row in alone)
     timeless = [[{**row, "wall_s": 0} for row in rows] for rows in (alone, together)]
     assert timeless[0] == timeless[1]
     for run in runs:
@@ -80,6 +87,13 @@ def test_processes_share_the_runs_and_give_what_one_gives(tmp_path: Path) -> Non
                 for folder in ("alone", "together")]  # fmt: skip
         assert maps[0].read_bytes() == maps[1].read_bytes()
     assert conduct(runs, tmp_path / "together", workers=2, task=never) == together
+    found = {sample.name: sample for sample in samples.read(tmp_path / "alone")}
+    for run in runs:
+        sample = found[run.name]
+        assert sample.label == "orange"
+        assert sample.scene is not None
+        assert sample.scene.object == random_object("orange", run.seed, area_mm=(140, 140))
+        assert np.nanmax(sample.heights.height_mm) > sample.scene.table_z_mm + 10
 
 
 def test_an_interrupt_while_the_workers_start_waits_until_they_can_be_ended(
@@ -350,16 +364,23 @@ def test_the_command_takes_a_scheduler(
     assert "There is no scheduler at tcp://127.0.0.1:9." in capsys.readouterr().err
 
 
-def killed_at_the_second(run: Run) -> Outcome:
+def killed_at_the_second(first_line: Path, run: Run) -> Outcome:
     if run.seed == 1:
+        deadline_s = time.monotonic() + 120
+        while not first_line.exists() and time.monotonic() < deadline_s:
+            time.sleep(0.01)
         os.kill(os.getpid(), signal.SIGKILL)
     return Outcome(row={"run": run.name, "status": "done"})
 
 
 def test_a_killed_worker_costs_its_run_and_no_other(tmp_path: Path) -> None:
     dask: Any = importlib.import_module("dask.config")
+    runs = plan(seeds=2).runs()
+    # It held only where the runs went to different workers: what else a killed worker has fails
+    # too. So the first is kept before the second's worker is killed.
+    task = partial(killed_at_the_second, tmp_path / study.RUNS / runs[0].name / "row.json")
     with dask.set({"distributed.scheduler.allowed-failures": 0}):  # it is not tried again
-        rows = conduct(plan(seeds=2).runs(), tmp_path, workers=2, task=killed_at_the_second)
+        rows = conduct(runs, tmp_path, workers=2, task=task)
     assert [row["status"] for row in rows] == ["done", "failed"]
     assert "KilledWorker" in rows[1]["error"]
 
