@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
+from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
@@ -385,12 +386,30 @@ def test_a_killed_worker_costs_its_run_and_no_other(tmp_path: Path) -> None:
     assert "KilledWorker" in rows[1]["error"]
 
 
+def no_process() -> None:
+    raise AssertionError("a process for workers was begun")
+
+
+def test_one_run_or_none_begins_no_other_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # One for workers was begun before it was known whether there are runs for them, and before
+    # a missing extra or a folder in use was told.
+    monkeypatch.setattr(forkserver, "ensure_running", no_process)
+    for _ in range(2):  # the second time nothing is left
+        call("--vary", SMALL[1], "--no-report", "--workers", "2", "--out", str(tmp_path / "study"))
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/thesis.txt").write_text("mine")
+    call("--vary", "scan.step_mm=10,20", "--workers", "2", "--out", str(tmp_path / "other"), code=1)
+
+
 def test_a_missing_extra_is_told_before_anything_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setattr(forkserver, "ensure_running", no_process)
     with pytest.raises(SystemExit) as ended:
-        main(["study", "--seeds", "1", "--out", str(tmp_path / "study")])
+        main(["study", "--seeds", "1", "--workers", "2", "--out", str(tmp_path / "study")])
     assert ended.value.code == 1
     assert "setae[study]" in capsys.readouterr().err
     assert not (tmp_path / "study").exists()

@@ -87,9 +87,7 @@ def study(
             objects=object or (), seeds=seeds, modes=mode or (), plants=plant or (),
             vary=vary or (), config=config, keep_logs=keep_logs,
         )  # fmt: skip
-    several = studies.workers_for(workers, scheduler) > 1
-    if several and scheduler is None:
-        studies.prepare_workers()
+    studies.workers_for(workers, scheduler)
     studies.require()
     goes_on = out is not None and (out / studies.RUNS).is_dir()
     folder = new_folder("study", out, force=force or goes_on)

@@ -10,7 +10,6 @@ from setae.experiments.study.conducting import (
     RUNS,
     Row,
     conduct,
-    prepare_workers,
     require,
     workers_for,
 )
@@ -29,7 +28,6 @@ __all__ = [
     "load",
     "of_options",
     "perform",
-    "prepare_workers",
     "read_table",
     "require",
     "with_earlier",

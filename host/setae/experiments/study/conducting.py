@@ -29,7 +29,6 @@ __all__ = [
     "Row",
     "conduct",
     "finished",
-    "prepare_workers",
     "require",
     "workers_for",
 ]
@@ -55,7 +54,9 @@ _OF_WORKERS: Final = {
 
 
 def require() -> None:
-    """Import what a study needs, before any work is done.
+    """Look for what a study needs, before any work is done.
+
+    It is not imported yet: that is done while the workers' process imports the same.
 
     Raises
     ------
@@ -63,7 +64,7 @@ def require() -> None:
         The extra ``study`` isn't installed.
     """
     for module in ("distributed", "pyarrow", "scipy", "threadpoolctl"):
-        extras.load(module, "study", "A study")
+        extras.find(module, "study", "A study")
 
 
 def workers_for(workers: int | None, scheduler: str | None) -> int:
@@ -82,11 +83,8 @@ def workers_for(workers: int | None, scheduler: str | None) -> int:
     return workers
 
 
-def prepare_workers() -> None:
-    """Begin the process that workers on this machine come out of; it ends with this one.
-
-    `conduct` does so itself. Whoever has something else to import first does it sooner.
-    """
+def _prepare_workers() -> None:
+    """Begin the process that workers on this machine come out of; it ends with this one."""
     with _interrupts_held_back():
         multiprocessing.set_forkserver_preload(list(_NEEDED))
         forkserver.ensure_running()
@@ -194,7 +192,7 @@ def _distributed(
     runs: Sequence[Run], workers: int, scheduler: str | None, task: Callable[[Run], Outcome]
 ) -> Iterator[tuple[Run, Outcome]]:
     if scheduler is None:
-        prepare_workers()
+        _prepare_workers()
     distributed = extras.load("distributed", "study", "More than one worker")
     dask_config = extras.load("dask.config", "study", "More than one worker")
     with ExitStack() as stack:
