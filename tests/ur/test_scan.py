@@ -98,6 +98,25 @@ def test_a_corner_outside_of_the_box_is_told_before_anything_moves(fake: FakeCon
         assert opened.robot.lengths_mm == pytest.approx([70.0] * 4, abs=0.1)
 
 
+def test_an_earlier_log_outlives_a_box_that_is_too_small(
+    fake: FakeController, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With --force the earlier log was deleted and the servos enabled before the box was looked
+    at: it left neither the old scan nor a new one.
+    """
+    config, _ = quick()
+    robot, log = tmp_path / "robot.toml", tmp_path / "run" / "paper.mcap"
+    robot.write_text(config.to_toml())
+    log.parent.mkdir()
+    log.write_bytes(b"a scan of yesterday")
+    with pytest.raises(SystemExit) as ended:
+        main(["scan", "--sim", "--object", "none", "--stage", fake.url, "--config", str(robot),
+              "--area", "1980x30", "--out", str(log.parent), "--force"])  # fmt: skip
+    assert ended.value.code != 0
+    assert "the box goes" in capsys.readouterr().err
+    assert log.read_bytes() == b"a scan of yesterday"
+
+
 def test_the_dry_run_shows_the_corners(
     fake: FakeController, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -23,6 +23,7 @@ from setae.config import Config
 from setae.errors import InputError
 from setae.experiments import scan as scans
 from setae.experiments.events import Event
+from setae.experiments.reach import require_reachable
 from setae.experiments.scan import Mode, ScanResult
 from setae.heightmap import TOUCHED
 from setae.objects import TableScene, UnknownScene
@@ -184,6 +185,8 @@ class _Scanning:
             ) as opened,
         ):
             arm_base_mm = _arm_base_mm(opened, job)
+            # Before an earlier log makes way; `scan` looks again, for whoever calls it.
+            require_reachable(opened.stage, scans.arm_targets_mm(job.config.scan))
             # Only now, so that a board that isn't there costs neither work nor a folder.
             log = self._folder() / job.name
             if self._run.force or log in job.replaces:
