@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -229,6 +230,67 @@ def test_a_computer_that_stalls_does_not_blame_the_controller() -> None:
     now_s += 10
     watch.look()
     assert watch.unseen_s - before_s == pytest.approx(0.05)
+
+
+def test_a_state_that_the_library_cannot_tell_counts_as_unseen() -> None:
+    """Its exception ended the watching thread without a word: a controller that froze afterwards
+    was never noticed.
+    """
+
+    def missing() -> float:
+        raise RuntimeError("unable to get state data for specified key: timestamp")
+
+    clock = itertools.count(100.0, 0.01)
+    watch = Watch(missing, lambda: next(clock))
+    watch.start()
+    end_s = time.monotonic() + TIMEOUT_S
+    while watch.unseen_s < 0.1:  # ten looks of the thread
+        assert time.monotonic() < end_s
+        time.sleep(0.005)
+    watch.close()
+
+
+class Refusing:
+    """The library's control, which fails at every sign of life, and only there."""
+
+    def __init__(self, control: Any) -> None:
+        self._control = control
+
+    def kickWatchdog(self) -> None:  # noqa: N802  # the library's name
+        raise RuntimeError("RTDEControlInterface: refused")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._control, name)
+
+
+def test_an_arm_whose_controller_fails_at_a_call_is_braked(
+    fake: FakeController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Any failure of the library passed for a frozen controller, which nobody tells to brake:
+    the arm went on to its target while the controller told where it was.
+    """
+    with connected(fake) as stage:
+        stage.move_to((0, 0, -80))
+        poll_until(stage, lambda: far_on_its_way(stage))
+        controller = stage._controller
+        monkeypatch.setattr(controller, "_control", Refusing(controller._control))
+        with pytest.raises(ArmFrozenError, match="failed at a sign of life"):
+            poll_until(stage, lambda: False)
+        assert fake.told()["brake"] == 0
+        stage.stop()
+        poll_until(stage, lambda: fake.told()["brake"] == pytest.approx(0.2))
+
+
+def test_closing_twice_says_goodbye_once(
+    fake: FakeController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second close handed its goodbye to a worker that had ended, and waited in vain."""
+    with connected(fake) as stage:
+        stage.close()
+        submitted: list[str] = []
+        monkeypatch.setattr(stage._worker, "submit", lambda what, _: submitted.append(what))
+        stage.close()
+    assert not submitted
 
 
 def test_a_box_that_was_never_set_is_told(fake: FakeController) -> None:

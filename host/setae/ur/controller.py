@@ -180,7 +180,17 @@ class Controller:
             raise kind(f"The controller at {self._host} failed at {what}: {error}.") from error
 
     def state(self) -> ArmState:
-        """What the controller last told; never waits."""
+        """What the controller last told; never waits.
+
+        Raises
+        ------
+        ArmFrozenError
+            The library has no state.
+        """
+        state: ArmState = self._call("its state", self._read_state)
+        return state
+
+    def _read_state(self) -> ArmState:
         receive = self._receive
         x, y, z, *turn = receive.getActualTCPPose()
         return ArmState(
@@ -197,7 +207,7 @@ class Controller:
 
     def program_runs(self) -> bool:
         """Whether the controller still takes moves; never waits."""
-        return bool(self._control.isProgramRunning())
+        return bool(self._call("its program", self._control.isProgramRunning))
 
     def kick_watchdog(self) -> None:
         """Tell the controller that the host lives."""

@@ -94,6 +94,8 @@ class UrStage:
         self._settings = config.ur
         self._clock = clock
         self._failure: StageError | None = None
+        self._lost = False  # it tells nothing, or answers no more: a brake won't reach it
+        self._closed = False
         self._worker = Worker(clock)
         self._controller = Controller(host, config.ur)
         self._watch = Watch(self._controller.timestamp_s, clock)
@@ -226,8 +228,9 @@ class UrStage:
         ------
         ArmFrozenError
             What `poll` raised: the controller is lost, and its own watchdog is what stops the arm.
+            One that only failed at a call is braked.
         """
-        if isinstance(self._failure, ArmFrozenError):
+        if self._failure is not None and self._lost:
             raise self._failure
         self._move = None
         deceleration = self._config.stage.acceleration_mm_s2
@@ -258,7 +261,7 @@ class UrStage:
         self._state = state = self._controller.state()
         unseen_s = self._watch.unseen_s
         if unseen_s > self._settings.state_age_s:
-            raise ArmFrozenError(f"The arm's controller has told nothing for {unseen_s:.2f} s.")
+            raise self._lose(f"The arm's controller has told nothing for {unseen_s:.2f} s.")
         check(state)
         self._feed_watchdog()
         if self._braking is not None:
@@ -301,20 +304,27 @@ class UrStage:
             job.result()
             return True
         if now_s - job.submitted_s > self._settings.command_deadline_s:
-            raise ArmFrozenError(
+            raise self._lose(
                 f"The arm's controller did not take {job.what} within"
                 f" {self._settings.command_deadline_s:g} s."
             )
         return False
 
+    def _lose(self, why: str) -> ArmFrozenError:
+        self._lost = True
+        return ArmFrozenError(why)
+
     # -------------------------------------------------------------------------- closing
 
     def close(self) -> None:
         """Let go of the arm; it stays where it is. Closing twice is fine."""
+        if self._closed:
+            return
+        self._closed = True
         self._watch.close()
         goodbye = self._worker.submit("goodbye", self._controller.close)
         self._worker.close()
-        if isinstance(self._failure, ArmFrozenError):  # it never answers
+        if self._lost:  # it never answers
             return
         with contextlib.suppress(StageError, RuntimeError):
             goodbye.wait(_GOODBYE_TIMEOUT_S)
