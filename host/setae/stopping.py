@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Final
 
 __all__ = ["stop_all"]
@@ -18,7 +19,8 @@ def stop_all(error: BaseException, *stops: Callable[[], object]) -> None:
     error
         What went wrong first.
     stops
-        Called one after the other, whatever the ones before did.
+        Called one after the other, whatever the ones before did; a Ctrl-C meanwhile is raised
+        after the last.
 
     Examples
     --------
@@ -29,13 +31,18 @@ def stop_all(error: BaseException, *stops: Callable[[], object]) -> None:
     >>> error.__notes__
     ['Stopping failed too: Nobody hears the stop.']
     """
-    for stop in stops:
-        try:
-            stop()
-        except Exception as failure:
-            note = _NOTE + _text(failure)
-            if note not in {_NOTE + _text(error), *getattr(error, "__notes__", [])}:
-                error.add_note(note)
+    with ExitStack() as left:
+        for stop in reversed(stops):
+            left.callback(_stop, error, stop)
+
+
+def _stop(error: BaseException, stop: Callable[[], object]) -> None:
+    try:
+        stop()
+    except Exception as failure:
+        note = _NOTE + _text(failure)
+        if note not in {_NOTE + _text(error), *getattr(error, "__notes__", [])}:
+            error.add_note(note)
 
 
 def _text(error: BaseException) -> str:

@@ -34,3 +34,16 @@ def test_the_same_failure_again_is_no_news() -> None:
     error = TimeoutError()
     stop_all(error, failing(TimeoutError()))
     assert not hasattr(error, "__notes__")
+
+
+def test_a_ctrl_c_during_one_stop_does_not_skip_the_next() -> None:
+    """A second Ctrl-C while the arm was told to stop left the robot without its stop."""
+    stopped: list[str] = []
+
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    error = OSError("The cable is out.")
+    with pytest.raises(KeyboardInterrupt):
+        stop_all(error, interrupted, lambda: stopped.append("robot"))
+    assert stopped == ["robot"]
