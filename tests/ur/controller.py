@@ -33,7 +33,7 @@ def boxed(settings: Ur) -> Ur:
 def patient(settings: Ur) -> Ur:
     """For a busy machine, on which the stand-in may get no turn for a while; with a box."""
     return dataclasses.replace(
-        boxed(settings), state_age_s=3.0, command_deadline_s=20.0, watchdog_hz=0.5
+        boxed(settings), state_age_s=5.0, command_deadline_s=20.0, watchdog_hz=0.5
     )
 
 
