@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from setae.sim import SimulationError, World
+from setae_protocol.messages import SERVO_FRAME_US
 
 __all__ = ["Played", "play"]
 
-_FRAME_US = 20_000
 _LATELY_S = 0.5
 _QUIET = {"sensor.noise_hpa": 0.0, "sensor.drift_hpa_per_sqrt_s": 0.0}
 
@@ -58,7 +58,7 @@ def play(parameters: Mapping[str, float], seed: int, pulse_us: ArrayLike) -> Pla
         sample_us = 1e6 / world.get("sensor.rate_hz")
         heard_hpa = [0.0]
         for number, row in enumerate(np.asarray(pulse_us, dtype=float).tolist(), start=1):
-            end_us = number * _FRAME_US
+            end_us = number * SERVO_FRAME_US
             while len(heard_hpa) * sample_us <= end_us:
                 world.run(round(len(heard_hpa) * sample_us))
                 heard_hpa.append(abs(world.sense() - ambient_hpa))
