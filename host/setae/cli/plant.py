@@ -17,7 +17,8 @@ def plant_command(name: str | None = None, *, config: Path | None = None) -> Non
     """Print all parameters of a simulated robot as CSV: value, default and range.
 
     A name ends with its unit (those of one tendon with the tendon's number behind it); without
-    one it is a ratio. Any of them can be set in the configuration, below [simulator].
+    one it is a ratio, a count, a direction (1 or -1) or a switch (0 or 1). Any of them can be set
+    in the configuration, below [simulator].
 
     Parameters
     ----------
@@ -28,4 +29,4 @@ def plant_command(name: str | None = None, *, config: Path | None = None) -> Non
     """
     print(_HEADER)
     for row in rig.simulator_table(load(config), name):
-        print(f"{row.name},{row.value:g},{row.default:g},{row.least:g},{row.most:g}")
+        print(f"{row.name},{row.value!r},{row.default!r},{row.least!r},{row.most!r}")
