@@ -246,6 +246,23 @@ def test_the_list_of_targets_is_a_table_that_can_be_filled_in(
     assert lines[1].startswith("C z30,0.000,0.000,30.000,30.000")
 
 
+def test_a_target_that_another_log_measured_is_not_unsolved(tmp_path: Path) -> None:
+    """It was named as not measured beside its own measured position."""
+    first, second = paper_targets(load())[9:11]
+    metadata = {"experiment": "validate", "model": "paper", "simulated": True}
+    with record.Recorder(tmp_path / "a.mcap", metadata={**metadata, "config": ""}) as recorder:
+        for target in (first, second):
+            data = {"label": target.label, "residual": 0.5}
+            recorder.experiment(0, runs.UNSOLVED, data)
+            recorder.experiment(0, "target", {"label": target.label, "position_mm": None})
+    measured(
+        tmp_path / "b.mcap", [Pose(first, np.array(first.position_mm))], load(), model="paper",
+        files=["x.csv"],
+    )  # fmt: skip
+    (run,) = runs_in(tmp_path)
+    assert list(run.unsolved) == [second.label]
+
+
 def test_causes_alone_and_mended_with_the_largest_gain_first(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

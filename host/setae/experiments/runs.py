@@ -161,7 +161,9 @@ def _run(model: str, logs: Sequence[Log]) -> Run:
         poses=tuple(pose for pose in poses if pose is not None),
         visited=tuple(found),
         cut_mm=cut_mm,
-        unsolved=unsolved,
+        unsolved={
+            label: residual for label, residual in unsolved.items() if found.get(label) is None
+        },
         complete=any(log.events("validate_end") for log in logs),
         targets=targets,
         config=config,
