@@ -77,6 +77,7 @@ SETAE_EXPORT int setae_world_truth(const setae_world* world, setae_truth* out) {
     out->pressure_hpa = w.pressure_hpa();
     if (w.foreign()) {
       out->plant_residual = out->largest_residual = std::numeric_limits<double>::quiet_NaN();
+      out->unsolved_samples = out->plant_iterations = -1;
     } else {
       out->plant_residual = plant.residual();
       out->largest_residual = w.largest_residual();

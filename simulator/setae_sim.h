@@ -39,9 +39,9 @@ typedef struct {
   double pressure_hpa;        /* true pressure at the sensor, noise included */
   /* Scaled gradient norm of this equilibrium; below 1e-4 it is solved. NaN: of another plant. */
   double plant_residual;
-  double largest_residual;  /* of all samples since the start */
-  int64_t unsolved_samples; /* how many of them have no solution */
-  int64_t plant_iterations; /* Newton's steps to this equilibrium */
+  double largest_residual;  /* of all samples since the start; NaN: of another plant */
+  int64_t unsolved_samples; /* how many of them have no solution; -1: of another plant */
+  int64_t plant_iterations; /* Newton's steps to this equilibrium; -1: of another plant */
 } setae_truth;
 
 /* A world with every parameter at its default; nothing runs yet. */

@@ -210,6 +210,8 @@ def test_a_plugin_is_validated_and_its_bristle_calibrated(
     # An arc that is commanded as an arc; the servos' dead band is left.
     assert np.median([pose.in_plane_mm for pose in run.poses]) < 1.0
     assert np.isnan(run.logs[0].array("/truth", "largest_residual")).all()
+    # It said that none was without a solution.
+    assert np.isnan(run.logs[0].array("/truth", "unsolved_samples")).all()
     assert solving.told(run.logs) == ""
     with pytest.raises(SystemExit) as ended:
         main(["calibrate", "bristle", "--moves", "4", "--touches", "3", *robot,

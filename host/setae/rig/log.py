@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -182,5 +183,5 @@ class RigLog:
             pressure_hpa=truth.pressure_hpa,
             plant_residual=truth.plant_residual,
             largest_residual=truth.largest_residual,
-            unsolved_samples=truth.unsolved_samples,
+            unsolved_samples=math.nan if truth.unsolved_samples is None else truth.unsolved_samples,
         )

@@ -69,11 +69,11 @@ class Truth:
         Scaled gradient norm of the equilibrium; below `SOLVED` it is solved. NaN for a plug-in,
         of which nobody knows.
     plant_iterations
-        Newton's steps to it.
+        Newton's steps to it; None for a plug-in.
     largest_residual
         Of the samples since power-on; NaN for a plug-in.
     unsolved_samples
-        How many of them have no solution.
+        How many of them have no solution; None for a plug-in.
     """
 
     time_us: int
@@ -92,9 +92,9 @@ class Truth:
     bent_tip_mm: Array
     pressure_hpa: float
     plant_residual: float
-    plant_iterations: int
+    plant_iterations: int | None
     largest_residual: float
-    unsolved_samples: int
+    unsolved_samples: int | None
 
     @property
     def solved(self) -> bool:

@@ -45,6 +45,11 @@ def parameter_ranges() -> dict[str, tuple[float, float]]:
     return ranges
 
 
+def _known(count: int) -> int | None:
+    """A plug-in's counts are -1."""
+    return None if count < 0 else count
+
+
 def _vector(name: str, values: Sequence[float] | Array) -> ctypes.Array[ctypes.c_double]:
     array = np.asarray(values, dtype=np.float64)
     if array.shape != (3,):
@@ -347,9 +352,9 @@ class World:
             bent_tip_mm=now["bent_tip_mm"],
             pressure_hpa=raw.pressure_hpa,
             plant_residual=raw.plant_residual,
-            plant_iterations=raw.plant_iterations,
+            plant_iterations=_known(raw.plant_iterations),
             largest_residual=raw.largest_residual,
-            unsolved_samples=raw.unsolved_samples,
+            unsolved_samples=_known(raw.unsolved_samples),
         )
 
     def _look(self) -> CTruth:
