@@ -165,4 +165,4 @@ def test_how_well_it_is_solved_is_in_the_truth(driver: Driver) -> None:
     driver.world.remove_board()
     driver.world.pulse(0, 1500.0)
     driver.world.run(driver.world.now_us + 40_000)
-    assert driver.world.truth().plant_iterations  # in a move it takes steps, at rest none
+    assert driver.world.truth().plant_iterations  # a move takes steps
