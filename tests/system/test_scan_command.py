@@ -112,6 +112,70 @@ def test_one_resume_does_all_that_the_run_was_asked_for(
     assert "is complete" in capsys.readouterr().err
 
 
+def _interrupted(
+    out: Path, monkeypatch: pytest.MonkeyPatch, *arguments: str, at: tuple[str, int] = ("place", 1)
+) -> None:
+    with monkeypatch.context() as pressed:
+        pressed.setattr(live_map.LiveMap, "event", _ctrl_c_at(*at))
+        main_ends(130, "scan", "--sim", "--out", str(out), "--force", "--no-report", *arguments)
+
+
+def test_scans_of_two_runs_in_a_folder_go_on_each_with_its_own_settings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The first log's settings were taken for all: the orange was gone on with as a bare table.
+    out = tmp_path / "run"
+    _interrupted(out, monkeypatch, "--object", "orange:1", "--step", "100", "--mode", "paper")
+    _interrupted(out, monkeypatch, "--object", "none", "--area", "20", "--step", "20",
+                 "--mode", "adaptive", "--seed", "3")  # fmt: skip
+    main_ends(0, "scan", "--resume", str(out), "--no-report")
+    first, later = (record.read(out / f"paper{part}.mcap") for part in ("", "-2"))
+    assert later.config == first.config
+    assert later.metadata["seed"] == first.metadata["seed"] == 0
+    assert later.metadata["scene"]["object"]["shape"] == "orange"
+    assert read_parts([first, later]).complete
+    assert record.read(out / "adaptive-2.mcap").metadata["seed"] == 3
+    capsys.readouterr()
+
+
+def test_a_mode_that_two_runs_asked_for_with_other_settings_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # It was scanned with the settings of whichever log came first by its name.
+    out = tmp_path / "run"
+    for mode, area in (("paper", "20"), ("adaptive", "40")):
+        _interrupted(out, monkeypatch, "--object", "none", "--area", area, "--step", "20",
+                     "--mode", mode, "--mode", "safe")  # fmt: skip
+    capsys.readouterr()
+    main_ends(1, "scan", "--resume", str(out), "--no-report")
+    assert "adaptive.mcap and paper.mcap differ in settings" in capsys.readouterr().err
+    main_ends(0, "scan", "--resume", str(out / "paper.mcap"), "--no-report")
+    assert read_parts([record.read(out / f"paper{part}.mcap") for part in ("", "-2")]).complete
+    assert not (out / "safe.mcap").exists()
+
+
+def test_of_a_log_in_which_no_scan_had_begun_its_own_mode_is_done_and_none_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The run's other mode came first, and ended at its own log, which was there already. And
+    # `setae report` of the folder said only that this log holds no scan.
+    out = tmp_path / "run"
+    with monkeypatch.context() as pressed:
+        pressed.setattr(rig.Rig, "record", _ctrl_c_after_second(rig.Rig.record))
+        main_ends(
+            130, "scan", "--sim", "--object", "none", "--area", "20", "--step", "20",
+            "--mode", "paper", "--mode", "safe", "--out", str(out), "--no-report",
+        )  # fmt: skip
+    capsys.readouterr()
+    main_ends(0, "report", str(out))
+    printed = capsys.readouterr()
+    assert f"Left out: {out / 'safe.mcap'} holds no scan." in printed.err
+    assert read(out).mode == "paper"
+    main_ends(0, "scan", "--resume", str(out / "safe.mcap"), "--no-report")
+    assert read_parts([record.read(out / "safe.mcap")]).complete
+    assert not (out / "paper-2.mcap").exists()
+
+
 def _ctrl_c_at(name: str, count: int) -> Callable[[live_map.LiveMap, Event], None]:
     left = [count]
 

@@ -26,6 +26,7 @@ def report(log: Path, *more: Path, out: Path | None = None) -> None:
         the page.
     """
     from setae import report as pages
+    from setae.experiments import scan as scans
 
     logs = [read for given in (log, *more) for read in _logs_of(given)]
     page = out or (log if log.is_dir() else log.parent)
@@ -33,7 +34,10 @@ def report(log: Path, *more: Path, out: Path | None = None) -> None:
         page = page / "report.html"
     path = pages.write(logs, page)
     for read in logs:
-        _warn_of_damage(read)
+        if scans.is_vain(read):
+            print(f"setae: Left out: {read.path} holds no scan.", file=sys.stderr)
+        else:
+            _warn_of_damage(read)
     console.print(f"Report: {path}", markup=False, soft_wrap=True)
 
 

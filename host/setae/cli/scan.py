@@ -18,8 +18,7 @@ from setae.cli.arm import show_arm_targets
 from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.cli.live_map import LiveMap
 from setae.cli.runs import RunOptions, ended_early, make_way, say, what_is_left, write_report
-from setae.cli.scan_jobs import Job
-from setae.config import Config
+from setae.cli.scan_jobs import SAME_START_MM, Job
 from setae.errors import InputError
 from setae.experiments import scan as scans
 from setae.experiments.events import Event
@@ -34,8 +33,6 @@ from setae.wording import counted
 
 # A person moves the arm by hand between two places, or brings it to the first.
 _MANUAL_TIMEOUT_S = 3600.0
-# How far off its earlier start a UR arm may stand to resume a scan.
-_SAME_START_MM = 0.5
 
 
 @app.command
@@ -77,7 +74,7 @@ def scan(
         How far anything rises above the extended bristle's tip, in mm. The simulator knows.
     resume
         Folder of a run that ended early: what it lacks is scanned, with its settings, modes that
-        had not begun too. Or the log of one scan.
+        had not begun too. Or the log of one scan: what this one lacks.
     run
         What it writes, and the arm.
     where
@@ -129,7 +126,7 @@ class _Scanning:
         """Do them all."""
         with ended_early(self._what_is_left, what="robot and arm are stopped"):
             results = [self._one(job) for job in jobs]
-        _print_table(results, jobs[0].config)
+        _print_table(results, jobs)
         say(f"Logs: {self._folder()}")
 
     def report(self) -> None:
@@ -217,7 +214,7 @@ def _arm_base_mm(opened: rig.Rig, job: Job) -> tuple[float, ...] | None:
     if not isinstance(stage, UrStage):
         return None
     now_mm, then_mm = stage.base_mm(stage.position_mm), job.arm_base_mm
-    if then_mm is not None and np.linalg.norm(np.subtract(now_mm, then_mm)) > _SAME_START_MM:
+    if then_mm is not None and np.linalg.norm(np.subtract(now_mm, then_mm)) > SAME_START_MM:
         where = ", ".join(f"{value_mm:.1f}" for value_mm in then_mm)
         raise InputError(
             "The arm is not where the earlier run started.",
@@ -239,15 +236,14 @@ def _name(scene: TableScene) -> str:
     return "an empty table" if what is None else f"{what.shape}, size {what.scale:g}"
 
 
-def _print_table(results: Sequence[ScanResult], config: Config) -> None:
-    table_mm = results[0].scene.get("table_z_mm")
-    base_mm = config.scan_reach_mm if table_mm is None else float(table_mm)
-    above = "extended tip" if table_mm is None else "table"
+def _print_table(results: Sequence[ScanResult], jobs: Sequence[Job]) -> None:
+    above = "extended tip" if jobs[0].scene is None else "table"
     table = Table(caption=f"highest: above the {above}")
     table.add_column("mode")
     for name in ("robot time", "touched", "inferred", "empty", "flagged", "highest"):
         table.add_column(name, justify="right")
-    for result in results:
+    for result, job in zip(results, jobs, strict=True):
+        base_mm = job.config.scan_reach_mm if job.scene is None else job.scene.table_z_mm
         mark = result.height_map.mark
         heights_mm = result.height_map.points_mm()[:, 2]
         table.add_row(

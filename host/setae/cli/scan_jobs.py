@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 import tomllib
 from collections.abc import Callable, Sequence
@@ -17,8 +18,12 @@ from setae.errors import InputError, LogError
 from setae.experiments import scan as scans
 from setae.experiments.scan import Mode, ScanResult
 from setae.objects import TableScene, of_description, random_object, table_scene
+from setae.record import Log
 
-__all__ = ["Job", "fresh", "resumed", "settings", "warn_of_no_height"]
+__all__ = ["SAME_START_MM", "Job", "fresh", "resumed", "settings", "warn_of_no_height"]
+
+SAME_START_MM = 0.5
+"""How far off its earlier start a UR arm may stand to resume a scan."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,48 +152,80 @@ def _scene(config: Config, path: Path) -> TableScene:
 
 
 def resumed(path: Path, where: Where) -> tuple[list[Job], Callable[[], Path]]:
-    """What a run left undone: scans that ended early, then modes that had not begun."""
+    """What a run left undone: scans that ended early, then modes that had not begun.
+
+    Of a single log: what its scan lacks.
+    """
     found = [path] if path.is_file() else sorted(path.glob("*.mcap"))
     if not found:
         raise LogError(f"{path} holds no log.", "Give the folder that `setae scan` wrote.")
-    logs = [record.read(log) for log in _all_parts(found)]
+    logs = [record.read(log) for log in (_all_parts(path) if path.is_file() else found)]
     # A run that ended while the robot was being enabled leaves a log in which no scan has begun.
-    vain = [log for log in logs if log.metadata.get("experiment") == scans.EXPERIMENT
-            and not log.events("scan_start")]  # fmt: skip
-    begun = scans.scans_of(log for log in logs if log not in vain)
-    about = logs[0].metadata
-    simulated = bool(about.get("simulated"))
-    if simulated and where.port is not None:
-        raise InputError("That scan was simulated, so --port has no part in it.", "Leave it out.")
-    plant = str(about.get("plant") or "")
-    base_mm = about.get("arm_base_mm")
-    asked = tuple(about.get("modes") or ()) if path.is_dir() or not begun else ()
-    job = Job(
-        url=(plant if plant.startswith("python:") else "sim://") if simulated else where.url,
-        config=logs[0].config,
-        mode=about["mode"],
-        modes=tuple(about.get("modes") or ()),
-        seed=int(about.get("seed") or 0),
-        scene=of_description(about.get("scene") or {}) if simulated else None,
-        replaces=frozenset(log.path for log in vain),
-        arm_base_mm=None if base_mm is None else tuple(base_mm),
-    )
+    vain = [log for log in logs if scans.is_vain(log)]
+    # A folder may hold scans of several runs: each goes on with its own settings.
+    begun = scans.scans_of(logs) if len(vain) < len(logs) else []
+    replaces = frozenset(log.path for log in vain)
     left, modes = [], set()
     for parts in begun:
         known = scans.read_parts(parts)
         modes.add(known.mode)
         if not known.complete:
-            again = dataclasses.replace(job, mode=known.mode, known=known, part=len(parts) + 1)
-            left.append(again)
-    left += [dataclasses.replace(job, mode=mode) for mode in asked if mode not in modes]
+            job = _job(parts[0], known.mode, where, replaces)
+            left.append(dataclasses.replace(job, known=known, part=len(parts) + 1))
+    firsts = [*(parts[0] for parts in begun), *vain]
+    for mode in dict.fromkeys(mode for log in firsts for mode in _asked(log, path)):
+        if mode not in modes:
+            asking = [log for log in firsts if mode in _asked(log, path)]
+            jobs = [_job(log, mode, where, replaces) for log in asking]
+            if not all(_alike(job, jobs[0]) for job in jobs):
+                names = " and ".join(log.path.name for log in asking)
+                raise InputError(
+                    f"Which scan mode {mode} has to do is not clear: {names} differ in settings.",
+                    f"Go on with each alone, as in --resume {asking[0].path}.",
+                )
+            left.append(jobs[0])
     if not left:
         raise InputError(f"The scan in {path} is complete.", "`setae report` makes its report.")
     return left, lambda: logs[0].path.parent
 
 
-def _all_parts(logs: Sequence[Path]) -> list[Path]:
-    """Of one log: the others of its scan, which lie beside it."""
-    if len(logs) > 1:
-        return list(logs)
-    stem = re.sub(r"-\d+$", "", logs[0].stem)
-    return sorted(logs[0].parent.glob(f"{stem}*.mcap"))
+def _job(log: Log, mode: Mode, where: Where, replaces: frozenset[Path]) -> Job:
+    """A scan with the settings of a log."""
+    about = log.metadata
+    simulated = bool(about.get("simulated"))
+    if simulated and where.port is not None:
+        raise InputError("That scan was simulated, so --port has no part in it.", "Leave it out.")
+    plant = str(about.get("plant") or "")
+    base_mm = about.get("arm_base_mm")
+    return Job(
+        url=(plant if plant.startswith("python:") else "sim://") if simulated else where.url,
+        config=log.config,
+        mode=mode,
+        modes=tuple(about.get("modes") or ()),
+        seed=int(about.get("seed") or 0),
+        scene=of_description(about.get("scene") or {}) if simulated else None,
+        replaces=replaces,
+        arm_base_mm=None if base_mm is None else tuple(base_mm),
+    )
+
+
+def _asked(log: Log, path: Path) -> tuple[Mode, ...]:
+    """All modes of a log's run; its own where it was given alone."""
+    return (log.metadata["mode"],) if path.is_file() else tuple(log.metadata.get("modes") or ())
+
+
+def _alike(one: Job, other: Job) -> bool:
+    """Whether both have the same settings, and begin at the same place."""
+    names = ("url", "config", "seed", "scene")
+    if any(getattr(one, name) != getattr(other, name) for name in names):
+        return False
+    if one.arm_base_mm is None or other.arm_base_mm is None:
+        return True
+    return math.dist(one.arm_base_mm, other.arm_base_mm) <= SAME_START_MM
+
+
+def _all_parts(log: Path) -> list[Path]:
+    """A log and the others of its scan, which lie beside it."""
+    stem = re.sub(r"-\d+$", "", log.stem)
+    part = re.compile(rf"{re.escape(stem)}(-\d+)?")
+    return sorted(each for each in log.parent.glob("*.mcap") if part.fullmatch(each.stem))

@@ -18,7 +18,14 @@ z up. Robot and arm may be real or simulated; nothing here can tell.
 
 from __future__ import annotations
 
-from setae.experiments.scan.reading import part_of, read, read_parts, scans_of, settings_of
+from setae.experiments.scan.reading import (
+    is_vain,
+    part_of,
+    read,
+    read_parts,
+    scans_of,
+    settings_of,
+)
 from setae.experiments.scan.run import (
     EXPERIMENT,
     MODES,
@@ -44,6 +51,7 @@ __all__ = [
     "Survey",
     "arm_targets_mm",
     "in_scene",
+    "is_vain",
     "part_of",
     "read",
     "read_parts",

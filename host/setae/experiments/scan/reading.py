@@ -9,11 +9,11 @@ from typing import Any, cast
 from setae import record
 from setae.config import Scan
 from setae.errors import LogError
-from setae.experiments.scan.run import MODES, Mode, ScanResult
+from setae.experiments.scan.run import EXPERIMENT, MODES, Mode, ScanResult
 from setae.experiments.scan.survey import Place, Survey
 from setae.record import Log
 
-__all__ = ["part_of", "read", "read_parts", "scans_of", "settings_of"]
+__all__ = ["is_vain", "part_of", "read", "read_parts", "scans_of", "settings_of"]
 
 
 def read(path: str | Path) -> ScanResult:
@@ -44,13 +44,16 @@ def read(path: str | Path) -> ScanResult:
 def scans_of(logs: Iterable[Log]) -> list[list[Log]]:
     """Sort logs into scans, each a first part and those that resumed it, in their order.
 
+    Logs in which no scan had begun (`is_vain`) are left out where others hold one.
+
     Raises
     ------
     LogError
         A log holds no scan, or a part of one is missing.
     """
     scans: dict[str, list[Log]] = {}
-    for log in logs:
+    given = list(logs)
+    for log in [log for log in given if not is_vain(log)] or given:
         if not log.events("scan_start"):
             raise LogError(f"{log.path} holds no scan.", "Give the log of a run of `setae scan`.")
         scans.setdefault(str(log.metadata.get("mode")), []).append(log)
@@ -62,6 +65,11 @@ def scans_of(logs: Iterable[Log]) -> list[list[Log]]:
                 "Give all logs of its folder.",
             )
     return list(scans.values())
+
+
+def is_vain(log: Log) -> bool:
+    """Whether a log of `setae scan` ended before its scan began."""
+    return log.metadata.get("experiment") == EXPERIMENT and not log.events("scan_start")
 
 
 def part_of(log: Log) -> int:
