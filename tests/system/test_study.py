@@ -11,7 +11,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from multiprocessing import forkserver
 from pathlib import Path
@@ -23,8 +23,10 @@ import pytest
 from setae.cli import main
 from setae.errors import ConfigError, InputError, SetaeError
 from setae.experiments import samples, study
-from setae.experiments.study import Outcome, Run, conduct, perform
+from setae.experiments.study import Outcome, Run, conduct, conducting, perform
 from setae.objects import random_object
+from setae.rig import assembly
+from setae.sim import SimulationError, World
 
 # Four places of a bare table: a tenth of a second of computing.
 SMALL = ["scan.area_mm=[20,20]", "scan.step_mm=20"]
@@ -235,6 +237,36 @@ def test_what_can_not_be_is_told_before_anything_runs(
 ) -> None:
     with pytest.raises((InputError, ConfigError), match=words):
         make()
+
+
+def test_a_spring_without_an_equilibrium_fails_its_run_and_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # One combination of possible values refused the whole study before anything had run.
+    class Unsolved(World):
+        def __init__(self, **given: Any) -> None:
+            super().__init__(**given)
+            self.friction = given["parameters"]["tendon.friction"]
+
+        def start(self, arm_mm: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+            if self.friction == 0.2:
+                raise SimulationError("Simulator: the spring has no equilibrium.")
+            super().start(arm_mm)
+
+    monkeypatch.setattr(assembly, "World", Unsolved)
+    runs = plan(vary=[*SMALL, "simulator.tendon.friction=0.1,0.2"]).runs()
+    rows = conduct(runs, tmp_path, workers=1)
+    assert [row["status"] for row in rows] == ["done", "failed"]
+    assert "no equilibrium" in rows[1]["error"]
+
+
+def test_workers_are_counted_where_the_system_does_not_say_which_cores_it_may_use(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # os.sched_getaffinity is Linux's: elsewhere `setae study` ended with an AttributeError.
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    assert conducting.workers_for(None, None) == 3
 
 
 def test_a_file_says_the_same_as_options(tmp_path: Path) -> None:

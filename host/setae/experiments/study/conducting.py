@@ -77,10 +77,17 @@ def workers_for(workers: int | None, scheduler: str | None) -> int:
     """
     if scheduler is not None and workers is not None:
         raise InputError("A scheduler has workers of its own.", "Give it, or --workers.")
-    workers = workers if workers is not None else len(os.sched_getaffinity(0))
+    workers = workers if workers is not None else _cores()
     if workers < 1:
         raise InputError(f"{workers} workers do nothing.", "Give 1 or more.")
     return workers
+
+
+def _cores() -> int:
+    """How many cores this process may use, or the machine has where nobody can tell."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _prepare_workers() -> None:

@@ -87,6 +87,8 @@ class Plan:
         simulator can't have a value, or the runs are too many.
     ConfigError
         There is no such key, or it can't have such a value.
+    SimulatorMissingError
+        The simulator isn't part of this installation.
     """
 
     objects: tuple[str, ...] = SHAPES
