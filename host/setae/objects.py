@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from setae.config import Config
 from setae.errors import InputError
@@ -192,7 +195,7 @@ class ScanObject:
         return _BUILDERS[self.shape](self.scale, foot, math.radians(self.yaw_deg))
 
 
-def random_object(shape: str, seed: int, *, area_mm: float | Sequence[float] = 200.0) -> ScanObject:
+def random_object(shape: str, seed: int, *, area_mm: ArrayLike = 200.0) -> ScanObject:
     """An object of random size, place and yaw, wholly in the scanned area.
 
     Parameters
@@ -202,7 +205,7 @@ def random_object(shape: str, seed: int, *, area_mm: float | Sequence[float] = 2
     seed
         Of size, place and yaw; the size is the same in every area.
     area_mm
-        Sides along x and y, or one for both.
+        Sides along x and y, (2,), or one for both.
 
     Raises
     ------
@@ -219,7 +222,7 @@ def random_object(shape: str, seed: int, *, area_mm: float | Sequence[float] = 2
     rng = random.Random(f"{shape} {seed}")
     scale = round(rng.uniform(SCALE_MIN, SCALE_MAX), 3)
     radius_mm = ScanObject(shape=shape, scale=scale).radius_mm
-    x_mm, y_mm = area_mm if isinstance(area_mm, Sequence) else (area_mm, area_mm)
+    x_mm, y_mm = (float(side_mm) for side_mm in np.broadcast_to(area_mm, 2))
     if min(x_mm, y_mm) < 2 * radius_mm:
         raise InputError(
             f"{shape}:{seed} doesn't fit into the scanned {x_mm:g} x {y_mm:g} mm.",

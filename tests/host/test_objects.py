@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -89,6 +90,13 @@ def test_the_table_goes_with_the_lengths_of_the_scan(
     assert over_table_mm == pytest.approx(3.0) or spare_mm == pytest.approx(clearance_mm)
     assert over_table_mm >= 3.0 - 1e-9
     assert spare_mm >= clearance_mm - 1e-9
+
+
+def test_an_area_may_be_an_array() -> None:
+    # It ended with "truth value of an array is ambiguous".
+    assert random_object("orange", 2, area_mm=np.array([140, 100])) == random_object(
+        "orange", 2, area_mm=(140.0, 100.0)
+    )
 
 
 def test_bad_objects_are_refused() -> None:
