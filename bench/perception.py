@@ -56,7 +56,13 @@ def trials(mode: str) -> Trials:
     )
     if failed:
         how += f"; {failed} scans failed, and count as named wrong and not detected"
-    return Trials(found=shapes.compare(samples.read(folder)), total=len(rows), how=how)
+    found = shapes.compare(samples.read(folder))
+    if found.left_out:
+        how += (
+            f"; {len(found.left_out)} left out, which count as named wrong and not detected:"
+            f" {' '.join(found.left_out)}"
+        )
+    return Trials(found=found, total=len(rows), how=how)
 
 
 def objects() -> Iterable[Figure]:
