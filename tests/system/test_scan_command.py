@@ -16,8 +16,8 @@ from setae.cli import live_map, main
 from setae.errors import LogError
 from setae.experiments.events import Event
 from setae.experiments.scan import read, read_parts, scans_of
-from setae.record import Recorder
 from setae.report import scan_pictures, style
+from setae.robot import Robot
 
 
 def main_ends(code: int, *arguments: str) -> None:
@@ -161,7 +161,7 @@ def test_of_a_log_in_which_no_scan_had_begun_its_own_mode_is_done_and_none_repor
     # `setae report` of the folder said only that this log holds no scan.
     out = tmp_path / "run"
     with monkeypatch.context() as pressed:
-        pressed.setattr(rig.Rig, "record", _ctrl_c_after_second(rig.Rig.record))
+        pressed.setattr(Robot, "enable", _ctrl_c_after_second(Robot.enable))
         main_ends(
             130, "scan", "--sim", "--object", "none", "--area", "20", "--step", "20",
             "--mode", "paper", "--mode", "safe", "--out", str(out), "--no-report",
@@ -188,18 +188,18 @@ def _ctrl_c_at(name: str, count: int) -> Callable[[live_map.LiveMap, Event], Non
     return event
 
 
-def _ctrl_c_after_second(record: Callable[..., Recorder]) -> Callable[..., Recorder]:
+def _ctrl_c_after_second(call: Callable[..., Any]) -> Callable[..., Any]:
     count = 0
 
-    def recorded(*arguments: Any, **options: Any) -> Recorder:
+    def called(*arguments: Any, **options: Any) -> Any:
         nonlocal count
         count += 1
-        recorder = record(*arguments, **options)
+        result = call(*arguments, **options)
         if count == 2:
             raise KeyboardInterrupt
-        return recorder
+        return result
 
-    return recorded
+    return called
 
 
 def test_a_start_inside_of_something_is_told_before_anything_moves(
