@@ -17,7 +17,7 @@ from setae.link.events import Event, TelemetryReceived
 from setae.link.lossy import Faults, LossyTransport
 from setae.link.session import Session
 from setae.robot import Robot
-from setae.scene import Obstacle, tube_scene
+from setae.scene import Obstacle, TubeScene, tube_scene
 from setae.sim import SensorFault, SimTransport, SimulatedStage, World, add_solid
 
 # The board of those tests that name none: "avr" for the one of `bench`, `compressed`.
@@ -103,19 +103,20 @@ def bench(
     *,
     seed: int = 1,
     obstacle: Obstacle | None = None,
+    scene: TubeScene | None = None,
     down: Faults | None = None,
     up: Faults | None = None,
     parameters: Mapping[str, float] | None = None,
     config: Config | None = None,
     back_end: str | None = None,
 ) -> Iterator[Bench]:
-    """A connected robot, relaxed, in a world of its own.
+    """A connected robot, relaxed, in a world of its own: the tube, or another scene.
 
     `back_end` "avr": its board is the built firmware in the simulated UNO.
     """
     config = config or load()
     back_end = back_end or os.environ.get(BACK_END_VARIABLE, "sim")
-    scene = tube_scene(config, obstacle)
+    scene = scene or tube_scene(config, obstacle)
     with World(seed=seed, parameters={**dict(config.simulator), **(parameters or {})}) as world:
         for solid in scene.solids:
             add_solid(world, solid)

@@ -16,7 +16,7 @@ from setae.experiments.targets import Target, choose, paper_targets
 from setae.experiments.validate import validate
 from setae.link.lossy import Faults
 from setae.link.session import Session
-from setae.scene import Obstacle
+from setae.scene import Obstacle, open_scene
 from setae_protocol.messages import State
 
 TARGET_MM = (15.0, 0.0, 60.0)
@@ -137,7 +137,7 @@ def test_a_validation_measures_the_same_on_both() -> None:
     targets = choose(paper_targets(config), 5)
     tops_mm = []
     for back_end in ("sim", "avr"):
-        with bench(back_end=back_end, config=config) as made:
+        with bench(back_end=back_end, config=config, scene=open_scene()) as made:
             made.robot.enable(accept_jump=True)
 
             def top_mm(_: Target, made: Bench = made) -> FloatArray:
