@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from tests.simulator import shooting
-from tests.simulator.shooting import LENGTH_MM, Robot, rotation_of, slope
+from tests.simulator.shooting import LENGTH_MM, Robot, advanced, compliance_of, rotation_of
 
 from setae.sim import Truth
 
@@ -122,19 +122,12 @@ def _integrate(robot: Robot, wrench: Array, loads: Array) -> tuple[Rod, Array, A
     """
     force, moment = wrench[:3], wrench[3:]
     state = np.concatenate([np.zeros(3), [0, 0, 0, 1], moment])
-    compliance = np.zeros((3, 3))
-    compliance[:2, :2] = np.linalg.inv(robot.bending)
-    compliance[2, 2] = 1 / robot.torsion
+    compliance = compliance_of(robot)
     h = LENGTH_MM / STATIONS
     centre, axes = np.zeros((STATIONS + 1, 3)), np.zeros((STATIONS + 1, 3, 3))
     axes[0] = np.eye(3)
     for step in range(STATIONS):
-        at = step * h
-        a = slope(robot, compliance, at, state, force)
-        b = slope(robot, compliance, at + 0.5 * h, state + 0.5 * h * a, force)
-        c = slope(robot, compliance, at + 0.5 * h, state + 0.5 * h * b, force)
-        d = slope(robot, compliance, at + h, state + h * c, force)
-        state = state + h / 6 * (a + 2 * b + 2 * c + d)
+        state = advanced(robot, compliance, step * h, h, state, force)
         turn = rotation_of(state[3:7])
         centre[step + 1], axes[step + 1] = state[:3], turn
         if step + 1 < STATIONS:  # what the wall takes here, no station above has to carry

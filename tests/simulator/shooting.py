@@ -140,23 +140,36 @@ def slope(robot: Robot, compliance: Array, along: float, state: Array, force: Ar
     return np.concatenate([climb, turn, -np.cross(climb, force)])
 
 
+def compliance_of(robot: Robot) -> Array:
+    """Curvatures and twist by moments, in the middle of the rod."""
+    compliance = np.zeros((3, 3))
+    compliance[:2, :2] = np.linalg.inv(robot.bending)
+    compliance[2, 2] = 1 / robot.torsion
+    return compliance
+
+
+def advanced(
+    robot: Robot, compliance: Array, at_mm: float, step_mm: float, state: Array, force: Array
+) -> Array:
+    """The state a step of Runge and Kutta further up."""
+    half_mm = 0.5 * step_mm
+    a = slope(robot, compliance, at_mm, state, force)
+    b = slope(robot, compliance, at_mm + half_mm, state + half_mm * a, force)
+    c = slope(robot, compliance, at_mm + half_mm, state + half_mm * b, force)
+    d = slope(robot, compliance, at_mm + step_mm, state + step_mm * c, force)
+    return np.asarray(state + step_mm / 6 * (a + 2 * b + 2 * c + d))
+
+
 def _shoot(
     robot: Robot, wrench: Array, lengths_mm: Array, rounding_mm: float = 0.0
 ) -> tuple[Array, Array, Array]:
     """Mismatch at the top, top position and tensions for a wrench at the base."""
     force, moment = wrench[:3], 10 * wrench[3:]
-    compliance = np.zeros((3, 3))
-    compliance[:2, :2] = np.linalg.inv(robot.bending)
-    compliance[2, 2] = 1 / robot.torsion
+    compliance = compliance_of(robot)
     state = np.concatenate([np.zeros(3), [0, 0, 0, 1], moment])
     h = LENGTH_MM / STEPS
-    for step in range(STEPS):  # Runge and Kutta
-        at = step * h
-        a = slope(robot, compliance, at, state, force)
-        b = slope(robot, compliance, at + 0.5 * h, state + 0.5 * h * a, force)
-        c = slope(robot, compliance, at + 0.5 * h, state + 0.5 * h * b, force)
-        d = slope(robot, compliance, at + h, state + h * c, force)
-        state = state + h / 6 * (a + 2 * b + 2 * c + d)
+    for step in range(STEPS):
+        state = advanced(robot, compliance, step * h, h, state, force)
     top, rotation = state[:3], rotation_of(state[3:7])
     pull = robot.load_n + robot.tip_weight_n
     twist = np.cross(robot.load_offset_mm * rotation[:, 2], robot.load_n)
