@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from bench.figure import Figure
@@ -32,6 +33,15 @@ PLANT, MODE = "ideal", "paper"
 WORKERS = 2
 SPEED_TURNS = (1, WORKERS, WORKERS, 1, 1, WORKERS)
 """How many work, turn by turn."""
+STUDIES = (
+    (
+        "study_speedup_2_cores",
+        ("paper", "adaptive"),
+        "a study of the paper's 5 x 5 trials by its own cycle and by the adaptive mode",
+    ),
+    ("study_speedup_default", study.Plan().modes, "the default study"),
+)
+"""Name, modes and description of what is timed."""
 REPEATS = 8
 """Scans that a process does to show what the machine gives."""
 
@@ -148,45 +158,53 @@ def objects_adaptive() -> Iterable[Figure]:
 
 
 def study_speedup() -> Iterable[Figure]:
-    """The study that `setae study` does of itself: in one process, and with two workers.
+    """Studies as `setae study` does them: in one process, and with two workers.
 
     What else the machine does only ever makes a run longer. So each counts as long as its quickest
     turn took, and the turns lie to and fro. A turn is a process of its own, as a command is: one
     that has imported all, or has begun workers before, would begin sooner.
     """
-    times_s: dict[int, list[float]] = {1: [], WORKERS: []}
-    plain_s: dict[int, list[float]] = {1: [], WORKERS: []}
-    others = []
-    for workers in SPEED_TURNS:
-        busy_s, own_s = _busy_s(), _own_s()
-        times_s[workers] += _in_processes(1, _study_s, workers)
-        if workers == 1:  # what workers took is nobody's once they have ended
-            others.append((_busy_s() - busy_s - (_own_s() - own_s)) / times_s[1][-1])
-        plain_s[workers].append(max(_in_processes(workers, _scans_s, REPEATS)))
-    machine = WORKERS * min(plain_s[1]) / min(plain_s[WORKERS])
-    cores = len(os.sched_getaffinity(0))
-    yield Figure(
-        "study_speedup_2_cores",
-        round(min(times_s[1]) / min(times_s[WORKERS]), 2),
-        "1",
-        f"wall time of the default study, {len(study.Plan().runs())} scans, one after the other in"
-        f" one process ({_told(times_s[1])} s) over that in {WORKERS} dask workers"
-        f" ({_told(times_s[WORKERS])} s, their start and end included), the quickest of each; one"
-        f" thread each, {cores} cores, of which others took {max(*others, 0.0):.2f} at most while"
-        f" one process worked; the machine itself: {WORKERS} plain processes that repeat one scan"
-        f" do {machine:.2f} times as many as one alone",
-    )
+    plain_s = [_scans_gain() for _ in range(2)]
+    for name, modes, what in STUDIES:
+        times_s: dict[int, list[float]] = {1: [], WORKERS: []}
+        others = []
+        for workers in SPEED_TURNS:
+            busy_s, own_s = _busy_s(), _own_s()
+            times_s[workers] += _in_processes(1, _study_s, (modes, workers))
+            if workers == 1:  # what workers took is nobody's once they have ended
+                others.append((_busy_s() - busy_s - (_own_s() - own_s)) / times_s[1][-1])
+        plain_s.append(_scans_gain())
+        cores = len(os.sched_getaffinity(0))
+        yield Figure(
+            name,
+            round(min(times_s[1]) / min(times_s[WORKERS]), 2),
+            "1",
+            f"wall time of {what}, {len(study.Plan(modes=modes).runs())} scans, one after the other"
+            f" in one process ({_told(times_s[1])} s) over that in {WORKERS} dask workers"
+            f" ({_told(times_s[WORKERS])} s, their start and end included), the quickest of each;"
+            f" one thread each, {cores} cores, of which others took {max(*others, 0.0):.2f} at most"
+            f" while one process worked; the machine itself: {WORKERS} plain processes that repeat"
+            f" one scan do {min(plain_s):.2f} to {max(plain_s):.2f} times as many as one alone",
+        )
 
 
-def _in_processes(count: int, measure: Callable[[int], float], given: int) -> list[float]:
+def _scans_gain() -> float:
+    """How many times as many scans plain processes do at the same time as one does alone."""
+    alone_s = _in_processes(1, _scans_s, REPEATS)
+    beside_s = _in_processes(WORKERS, _scans_s, REPEATS)
+    return WORKERS * alone_s[0] / (sum(beside_s) / WORKERS)
+
+
+def _in_processes(count: int, measure: Callable[[Any], float], given: Any) -> list[float]:
     """Measure in new processes at the same time."""
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(count, mp_context=spawn) as pool:
         return list(pool.map(measure, [given] * count))
 
 
-def _study_s(workers: int) -> float:
-    runs = study.Plan().runs()
+def _study_s(given: tuple[tuple[str, ...], int]) -> float:
+    modes, workers = given
+    runs = study.Plan(modes=modes).runs()
     with tempfile.TemporaryDirectory() as folder:
         start_s = time.perf_counter()
         rows = study.conduct(runs, Path(folder), workers=workers)

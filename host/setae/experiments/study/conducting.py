@@ -20,6 +20,7 @@ from typing import Any, Final, TypeAlias
 
 from setae import extras
 from setae.errors import InputError, SetaeError
+from setae.experiments.scan import MODES
 from setae.experiments.study.one import LOG, Outcome, perform
 from setae.experiments.study.plan import Run
 
@@ -228,6 +229,8 @@ def _distributed(
                     f"There is no scheduler at {scheduler}.",
                     "Start one with `dask scheduler`, and give its address: tcp://HOST:8786.",
                 ) from error
+        # The long ones first: at the end, whoever has nothing left to do waits for a short one.
+        runs = sorted(runs, key=lambda run: MODES.index(run.mode))
         # Not pure: a run that failed is tried again by the next call, not remembered.
         futures = client.map(task, runs, pure=False, retries=0)
         of = {future.key: run for future, run in zip(futures, runs, strict=True)}
