@@ -71,6 +71,9 @@ def test_the_command_scans_in_two_modes_and_reports_them_side_by_side(
         (("--scene", "nowhere.toml"), "can't be read"),
         (("--resume", "nowhere"), "holds no log"),
         (("--resume", "nowhere", "--step", "5"), "goes on with the settings"),
+        # Nobody was told that these had no effect.
+        (("--resume", "nowhere", "--force"), "goes on with the settings"),
+        (("--resume", "nowhere", "--seed", "3"), "goes on with the settings"),
         (("--dry-run",), "Give --stage ur://ADDRESS too."),
     ],
 )
@@ -174,6 +177,27 @@ def test_of_a_log_in_which_no_scan_had_begun_its_own_mode_is_done_and_none_repor
     main_ends(0, "scan", "--resume", str(out / "safe.mcap"), "--no-report")
     assert read_parts([record.read(out / "safe.mcap")]).complete
     assert not (out / "paper-2.mcap").exists()
+
+
+def test_a_new_run_by_force_has_no_part_of_the_run_that_it_replaces(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The old run's second part stayed, and counted as that of the new one.
+    out = tmp_path / "run"
+    table = ("--object", "none", "--area", "20", "--step", "20", "--mode", "paper")
+    _interrupted(out, monkeypatch, *table)
+    main_ends(0, "scan", "--resume", str(out), "--no-report")
+    stale = (out / "paper-2.mcap").read_bytes()
+    capsys.readouterr()
+    main_ends(0, "scan", "--sim", *table, "--out", str(out), "--force", "--no-report")
+    printed = capsys.readouterr().out.replace("\n", "")
+    for name in ("paper.mcap", "paper-2.mcap"):
+        assert f"Replaced, because of --force: {out / name}" in printed
+    assert [path.name for path in out.iterdir()] == ["paper.mcap"]
+    # Put there by hand it is refused.
+    (out / "paper-2.mcap").write_bytes(stale)
+    with pytest.raises(LogError, match=r"paper-2\.mcap resumes another scan than"):
+        read(out)
 
 
 def _ctrl_c_at(name: str, count: int) -> Callable[[live_map.LiveMap, Event], None]:

@@ -127,6 +127,12 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_where_it_was(
     kept = {pose.target.label: pose.position_mm for pose in after.poses}
     for pose in before.poses:
         assert kept[pose.target.label] == pytest.approx(pose.position_mm)
+    # The second log of this run, and what was measured of it, counted as parts of a new one.
+    (out / "paper-measured.mcap").write_bytes((out / "paper-2.mcap").read_bytes())
+    code, _, errors = run(capsys, "--sim", "--targets", "5", "--force", *arguments[3:])
+    assert code == 0, errors
+    (anew,) = runs_in(out)
+    assert len(anew.logs) == len(anew.visited) == 1
 
 
 def test_a_run_that_ended_before_its_first_bent_target_is_reported(tmp_path: Path) -> None:

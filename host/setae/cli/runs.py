@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,7 +24,8 @@ class RunOptions:
     out
         Folder for logs and report; the default is the next free one in runs.
     force
-        Use --out though it holds files; logs of the same names are replaced.
+        Use --out though it holds files. Logs of the same names are replaced, and with them those
+        that resumed them.
     report
         Write the report.
     accept_jump
@@ -85,8 +87,30 @@ def ended_early(left: Callable[[], Sequence[str]], *, what: str) -> Iterator[Non
         raise
 
 
+def later_parts(log: Path) -> list[Path]:
+    """Logs that resumed a log, by their names: paper-2.mcap and so on for paper.mcap."""
+    part = re.compile(rf"{re.escape(log.stem)}-\d+")
+    return sorted(each for each in log.parent.glob("*.mcap") if part.fullmatch(each.stem))
+
+
 def make_way(log: Path) -> None:
-    """Remove the log of an earlier run, because --force was given.
+    """Remove the log of an earlier run, because --force was given, and say so.
+
+    Logs that resumed it go too: they would count as parts of the new one.
+
+    Raises
+    ------
+    LogError
+        It can't be removed.
+    """
+    # The first part last: what a failure leaves is still one run.
+    for old in (*reversed(later_parts(log)), log):
+        if remove(old):
+            say(f"Replaced, because of --force: {old}")
+
+
+def remove(log: Path) -> bool:
+    """Remove a log; whether there was one.
 
     Raises
     ------
@@ -94,11 +118,14 @@ def make_way(log: Path) -> None:
         It can't be removed.
     """
     try:
-        log.unlink(missing_ok=True)
+        log.unlink()
+    except FileNotFoundError:
+        return False
     except OSError as error:
         raise LogError(
             f"{log} can't be replaced: {error.strerror}.", "Give another --out."
         ) from error
+    return True
 
 
 def write_report(logs: Sequence[Path], folder: Path) -> None:

@@ -83,7 +83,7 @@ def scan(
     run, where = run or RunOptions(), where or Where()
     if resume is not None:
         given = (mode, object, scene, area, step, order, tallest, run.out, where.config,
-                 where.plant)  # fmt: skip
+                 where.plant, where.plugin, run.force or None, where.seed or None)  # fmt: skip
         if any(value is not None for value in given):
             raise InputError(
                 "--resume goes on with the settings of the earlier run.",

@@ -13,6 +13,7 @@ from pathlib import Path
 from setae import record
 from setae.cli import tell
 from setae.cli.common import Where
+from setae.cli.runs import later_parts
 from setae.config import Config
 from setae.errors import InputError, LogError
 from setae.experiments import scan as scans
@@ -226,6 +227,5 @@ def _alike(one: Job, other: Job) -> bool:
 
 def _all_parts(log: Path) -> list[Path]:
     """A log and the others of its scan, which lie beside it."""
-    stem = re.sub(r"-\d+$", "", log.stem)
-    part = re.compile(rf"{re.escape(stem)}(-\d+)?")
-    return sorted(each for each in log.parent.glob("*.mcap") if part.fullmatch(each.stem))
+    first = log.with_stem(re.sub(r"-\d+$", "", log.stem))
+    return [part for part in (first, *later_parts(first)) if part.exists()]

@@ -14,7 +14,7 @@ from setae import record, rig, tendons
 from setae.arc import FloatArray
 from setae.cli.common import Flag, Where, Whole, app, console, interrupts, new_folder
 from setae.cli.errors_table import print_causes, print_runs, print_targets
-from setae.cli.runs import ended_early, later, make_way, say, what_is_left, write_report
+from setae.cli.runs import ended_early, later, make_way, remove, say, what_is_left, write_report
 from setae.config import Config
 from setae.errors import InputError
 from setae.experiments import causes as why
@@ -232,6 +232,7 @@ class _Drive:
                 number += 1
         elif self._force:
             make_way(log)
+            make_way(_measured_log(self._where_to(), model))
         return log
 
     def _one(self, model: str, targets: Sequence[Target], *, accept_jump: bool) -> None:
@@ -335,7 +336,7 @@ def _import(
     # The run that was driven before may be there, and is gone on with.
     drove = out is not None and (out / f"{models[0]}.mcap").exists()
     folder = new_folder("validate", out, force=force or drove)
-    log = folder / f"{models[0]}-measured.mcap"
+    log = _measured_log(folder, models[0])
     if force:
         make_way(log)
     measured(log, poses, config, model=models[0], files=[Path(file).name for file in files])
@@ -343,6 +344,11 @@ def _import(
     for doubt in frames.doubts(poses):
         say(f"Is the frame right? {doubt}")
     return folder
+
+
+def _measured_log(folder: Path, model: str) -> Path:
+    """Where positions go that were measured outside; they belong to the run driven in a folder."""
+    return folder / f"{model}-measured.mcap"
 
 
 def _study(
@@ -363,7 +369,7 @@ def _study(
                 "noise_sd_mm": noise.sd_mm, "noise_seed": noise.seed}  # fmt: skip
     path = folder / f"{why.EXPERIMENT}.mcap"
     known = why.known(record.read(path), metadata) if resume and path.exists() else {}
-    make_way(path)
+    remove(path)
     with record.Recorder(path, metadata=metadata) as recorder, console.status("") as status:
         # A second of log time each, so that each is on the disk when the next begins.
         left = [case for case in study if case.name not in known]

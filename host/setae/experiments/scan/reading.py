@@ -83,7 +83,7 @@ def read_parts(parts: Sequence[Log]) -> ScanResult:
     Raises
     ------
     LogError
-        They hold no scan.
+        They hold no scan, or a part does not go on with those before it.
     """
     starts = [log.events("scan_start") for log in parts]
     if not all(starts):
@@ -99,6 +99,8 @@ def read_parts(parts: Sequence[Log]) -> ScanResult:
     # Of a single later part: what the others took.
     duration_s = float(starts[0][0].data.get("earlier_s") or 0.0)
     for log, start in zip(parts, starts, strict=True):
+        if log is not parts[0]:
+            _require_goes_on(log, parts[0], survey.known)
         found = [Place.of(event.data, event.time_us) for event in log.events("place")]
         survey.resume(found)
         places += found
@@ -111,6 +113,16 @@ def read_parts(parts: Sequence[Log]) -> ScanResult:
         complete=survey.known == len(survey),
         scene=parts[0].metadata.get("scene") or {},
     )
+
+
+def _require_goes_on(log: Log, first: Log, known: int) -> None:
+    """Refuse a part of another run: it began with other settings, or with other knowledge."""
+    began_with = log.events("scan_start")[0].data["known"]
+    if log.config != first.config or began_with != known:
+        raise LogError(
+            f"{log.path} resumes another scan than that of {first.path}.",
+            "Put the logs of each run into a folder of their own.",
+        )
 
 
 def settings_of(log: Log) -> Scan:
