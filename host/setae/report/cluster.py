@@ -70,6 +70,7 @@ def clouds_picture(path: Path, found: Comparison) -> Path:
     first = [found.samples[found.labels.index(shape)] for shape in shapes]
     away = [clouds.about_middle(sample.heights)[1] for sample in first]
     most_mm = max([1.0, *(float(one.max()) for one in away if len(one))])
+    plane = chr(97 + len(shapes))
     columns = 3 if len(shapes) <= 5 else 4
     rows = -(-(len(shapes) + 1) // columns)
     with style.used():
@@ -77,8 +78,9 @@ def clouds_picture(path: Path, found: Comparison) -> Path:
         figure = style.figure(width, height)
         top = style.headline(
             figure, "What the bristle felt of each object",
-            f"{_origin(found)}. (a) and on: the first of the scans of each, about the middle of "
-            f"its points. Last: all {len(found.samples)} scans.",
+            f"{_origin(found)}. (a) to ({chr(96 + len(shapes))}): the first of the scans of each, "
+            f"about the middle of its points. ({plane}): all {len(found.samples)} scans, in the "
+            "paper's form.",
         )  # fmt: skip
         grid = figure.add_gridspec(rows, columns, left=0.01, right=0.985, bottom=0.85 / height,
                                    top=top - 0.32 / height, wspace=0.1, hspace=0.16)  # fmt: skip
@@ -89,7 +91,7 @@ def clouds_picture(path: Path, found: Comparison) -> Path:
             axes.set_title(f"({chr(97 + index)}) {clouds.title_of(shape)}", pad=0)
         axes = figure.add_subplot(places[len(shapes)])
         _draw_plane(axes, found)
-        axes.set_title(f"({chr(97 + len(shapes))}) t-SNE of the paper's data", pad=8)
+        axes.set_title(f"({plane}) t-SNE of all scans", pad=8, loc="center")
         scale = extras.load("matplotlib.cm").ScalarMappable(cmap=style.colours(palette.AMOUNTS))
         scale.set_clim(0.0, most_mm)
         bar = figure.add_axes((0.06, 0.6 / height, 1.4 / columns - 0.06, 0.15 / height))
