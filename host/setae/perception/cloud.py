@@ -107,9 +107,10 @@ def read(path: str | Path) -> PointCloud:
         raise InputError(
             f"{path} can't be read: {error.strerror or error}.", "Check the file's name."
         ) from error
-    except (ValueError, KeyError, IndexError, EOFError) as error:
+    except Exception as error:  # a damaged file fails in as many ways as zip, zlib and NumPy have
+        what = error.problem if isinstance(error, InputError) else f"{error}."
         raise InputError(
-            f"{path} holds no point cloud: {error}.", "Give a file that `setae cloud` wrote."
+            f"{path} holds no point cloud: {what}", "Give a file that `setae cloud` wrote."
         ) from error
 
 
@@ -187,7 +188,8 @@ def _write_npy(path: Path, cloud: PointCloud) -> None:
 
 
 def _read_npy(path: Path) -> PointCloud:
-    points = np.load(path, allow_pickle=False)
+    with path.open("rb") as opened:
+        points = np.load(opened, allow_pickle=False)
     return PointCloud(points_mm=points, mark=np.full(len(points), TOUCHED[0]))
 
 
@@ -196,7 +198,7 @@ def _write_npz(path: Path, cloud: PointCloud) -> None:
 
 
 def _read_npz(path: Path) -> PointCloud:
-    with np.load(path, allow_pickle=False) as file:
+    with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
         return PointCloud(points_mm=file["points_mm"], mark=file["mark"])
 
 

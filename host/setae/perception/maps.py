@@ -54,15 +54,16 @@ def read(path: str | Path) -> HeightMap:
         The file can't be read, or holds no height map.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with Path(path).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             return HeightMap(**{name: file[name] for name in _FIELDS})
     except OSError as error:
         raise InputError(
             f"{path} can't be read: {error.strerror or error}.", "Check the file's name."
         ) from error
-    except (ValueError, KeyError, EOFError, TypeError, AttributeError) as error:
+    except Exception as error:  # a damaged file fails in as many ways as zip, zlib and NumPy have
+        what = error.problem if isinstance(error, InputError) else f"{error}."
         raise InputError(
-            f"{path} holds no height map: {error}.", "Give a file that `setae cloud` wrote."
+            f"{path} holds no height map: {what}", "Give a file that `setae cloud` wrote."
         ) from error
 
 
