@@ -153,6 +153,42 @@ def test_a_report_without_truth_has_no_measures_against_it(
         compare(found.samples[:2])
 
 
+def test_a_coarse_scan_has_no_height_error_and_finer_ones_count_by_their_places(
+    tmp_path: Path,
+) -> None:
+    # Of an object without a place away from edges the report told "nan", and the terminal NumPy's
+    # "Mean of empty slice". And a scan with a single such place counted as much as one with fifty.
+    trials = {
+        "orange": (felt(orange := random_object("orange", 1), seed=1, step_mm=20.0), orange),
+        "lid": (felt(lid := ScanObject(shape="lidded_container"), noise_mm=0, ragged=0), lid),
+        "high": (felt(lid, noise_mm=0, ragged=0, step_mm=25.0), lid),
+    }
+    high = trials["high"][0]
+    raised = dataclasses.replace(high, height_mm=high.height_mm + 3.0)
+    found = compare(
+        [
+            samples.Sample(
+                name=name,
+                label=what.shape,
+                heights=raised if name == "high" else heights,
+                reach_mm=REACH_MM,
+                scene=table_scene(CONFIG, what),
+                origin="made up",
+            )
+            for name, (heights, what) in trials.items()
+        ]
+    )
+    near = {one.name: by for one, by in zip(found.samples, found.nearness, strict=True) if by}
+    assert near["orange"].places == 0
+    few, many = near["high"].places, near["lid"].places
+    assert 0 < few < many / 3
+    page = pages.write(found, tmp_path).page.read_text()
+    told = f"<td>{3 * np.sqrt(few / (few + many)):.2f} mm</td>"
+    assert told in page
+    assert "nan" not in (tmp_path / "trials.csv").read_text()
+    assert ">nan" not in page
+
+
 def test_a_scan_that_ended_early_is_taken_as_far_as_it_goes_and_told(
     given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import html
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 
 from setae.experiments.shapes import Comparison
 from setae.perception.features import FEATURES
+from setae.perception.measures import Nearness
 from setae.report import clouds, extras, files, palette, style, template
 from setae.report.files import Report
 
@@ -222,10 +225,9 @@ def _measures(found: Comparison) -> str:
     ]
     near = [one for one in found.nearness if one is not None]
     if near:
-        rms = float(np.sqrt(np.nanmean([one.height_rms_mm**2 for one in near])))
-        chamfer = float(np.nanmean([one.chamfer_mm for one in near]))
-        rows.append(("height error away from edges, root mean square", f"{rms:.2f} mm"))
-        rows.append(("Chamfer distance to the true surface, mean", f"{chamfer:.2f} mm"))
+        rms, chamfer = _together(near)
+        rows.append(("height error away from edges, root mean square of all places", rms))
+        rows.append(("Chamfer distance to the true surface, mean", chamfer))
     body = "".join(f"<tr><td>{name}</td><td><b>{value}</b></td></tr>" for name, value in rows)
     return f"<table><tbody>{body}</tbody></table>"
 
@@ -241,21 +243,26 @@ def _shapes(found: Comparison) -> str:
             clouds.title_of(shape),
             f"{right} of {len(some)}",
             f"{unknown} of {len(some)}",
-            *_middle_of(near),
+            *_together(near),
         ]
         lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
     return (
         "<table><thead><tr><th>object</th><th>named right</th><th>unknown, when never met</th>"
-        "<th>height RMS (mm)</th><th>Chamfer (mm)</th></tr></thead>"
+        "<th>height RMS</th><th>Chamfer</th></tr></thead>"
         f"<tbody>{''.join(lines)}</tbody></table>"
     )
 
 
-def _middle_of(near: list[Any]) -> tuple[str, str]:
-    if not near:
-        return "–", "–"
-    rms = float(np.sqrt(np.nanmean([one.height_rms_mm**2 for one in near])))
-    return f"{rms:.2f}", f"{np.nanmean([one.chamfer_mm for one in near]):.2f}"
+def _together(near: Sequence[Nearness]) -> tuple[str, str]:
+    """Height error and Chamfer distance of some scans, in words."""
+    places = sum(one.places for one in near)
+    # A scan without a place away from edges has no height error, and one with many counts more.
+    square_mm2 = sum(one.places * one.height_rms_mm**2 for one in near if one.places)
+    chamfer_mm = [one.chamfer_mm for one in near if math.isfinite(one.chamfer_mm)]
+    return (
+        f"{math.sqrt(square_mm2 / places):.2f} mm" if places else "–",
+        f"{sum(chamfer_mm) / len(chamfer_mm):.2f} mm" if chamfer_mm else "–",
+    )
 
 
 def _trials(found: Comparison) -> str:
@@ -280,6 +287,12 @@ def _trials(found: Comparison) -> str:
     )
 
 
+def _numbers(near: Nearness | None) -> tuple[str, str]:
+    values = (near.height_rms_mm, near.chamfer_mm) if near else (math.nan, math.nan)
+    height_rms_mm, chamfer_mm = (f"{one:.4f}" if math.isfinite(one) else "" for one in values)
+    return height_rms_mm, chamfer_mm
+
+
 def _csv(path: Path, found: Comparison) -> Path:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -295,7 +308,7 @@ def _csv(path: Path, found: Comparison) -> Path:
                  f"{answer.confidence:.4f}" if answer.known else "", f"{answer.fit:.3g}",
                  "yes" if found.strangers[index].known else "no",
                  *(f"{value:.4f}" for value in found.plane[index]),
-                 *((f"{near.height_rms_mm:.4f}", f"{near.chamfer_mm:.4f}") if near else ("", "")),
+                 *_numbers(near),
                  *(f"{value:.5f}" for value in found.vectors[index]))
             )  # fmt: skip
     return path
