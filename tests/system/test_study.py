@@ -221,6 +221,8 @@ def test_the_name_of_a_run_changes_with_all_that_it_is_made_of() -> None:
         (lambda: plan(seeds=0), "seeds"),
         (lambda: plan(vary=["scan.step_mm"]), "no key with its values"),
         (lambda: plan(vary=["scan.step_mm=10,10"]), "twice"),
+        # The first one's values went without a word.
+        (lambda: plan(vary=["scan.step_mm=10", "scan.step_mm=20"]), "step_mm is given twice"),
         (lambda: plan(vary=["scan.stride_mm=10"]), "stride_mm"),
         (lambda: plan(vary=["scan.step_mm=-1"]), "step_mm"),
         (lambda: plan(seeds=100_001), "too many"),

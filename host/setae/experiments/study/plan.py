@@ -241,6 +241,10 @@ def of_options(
                 f"--vary {text!r} is no key with its values.",
                 "Give for example --vary scan.step_mm=10,20; texts in quotes.",
             )
+        if key.strip() in changes:
+            raise InputError(
+                f"--vary {key.strip()} is given twice.", f"Give all its values in one: {text},…"
+            )
         changes[key.strip()] = tuple(values)
     return Plan(**given, vary=changes, config=robot.load(config), keep_logs=keep_logs)
 
