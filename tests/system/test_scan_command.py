@@ -16,7 +16,7 @@ from setae.cli import live_map, main
 from setae.errors import LogError
 from setae.experiments.events import Event
 from setae.experiments.scan import read, read_parts, scans_of
-from setae.report import scan_pictures, style
+from setae.report import scan_page, scan_pictures, style
 from setae.robot import Robot
 
 
@@ -255,18 +255,20 @@ def test_a_scan_that_extends_less_than_the_robot_at_rest_goes_on_a_simulated_tab
 def test_a_scan_that_felt_nothing_is_drawn_as_that(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Its report had a scale of colours from 0.9 to 3.0 mm, of nothing.
+    # Its report had a scale of colours from 0.9 to 3.0 mm, of nothing, and an error of "nan (0)".
     drawn: dict[str, Any] = {}
     monkeypatch.setattr(style, "save", lambda figure, path, **_: drawn.update({path.stem: figure}))
     out = tmp_path / "run"
     main_ends(0, "scan", "--sim", "--object", "none", "--area", "20x20", "--step", "20",
               "--out", str(out), "--no-report")  # fmt: skip
-    scan_pictures.write_all(tmp_path, report.scan.scans(out))
+    felt = report.scan.scans(out)
+    scan_pictures.write_all(tmp_path, felt)
     assert {text.get_text() for axes in drawn["heights"].axes for text in axes.texts} == {
         "nothing touched", "nothing in reach",
     }  # fmt: skip
     for name in ("heights", "clouds"):
         assert not [axes for axes in drawn[name].axes if "height" in axes.get_ylabel()]
+    assert "nan" not in scan_page._table(felt)
 
 
 def test_a_real_scan_says_that_its_height_window_is_not_checked(

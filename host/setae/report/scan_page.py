@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from setae.experiments.scan.quality import agreement
+from setae.experiments.scan.quality import Quality, agreement
 from setae.heightmap import TOUCHED
 from setae.report import extras, palette, solving, template
 from setae.report.scan_maps import top_mm
@@ -120,16 +120,19 @@ def _table(scans: Sequence[Scan]) -> str:
             " / ".join(flagged),
         ]
         if truth:
-            found = scan.quality
-            cells += (
-                [f"{found.rms_mm:.2f} ({found.places})", f"{found.edge_rms_mm:.1f}"]
-                if found
-                else ["–", "–"]
-            )
+            cells += _errors(scan.quality)
         if paper is not None and len(scans) > 1:
             cells.append("–" if scan is paper else f"{_like(scan, paper):.1%}")
         lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
     return "".join([*lines, "</tbody></table>"])
+
+
+def _errors(found: Quality | None) -> tuple[str, str]:
+    """Height errors of a scan away from edges, with how many places that is, and at edges."""
+    return (
+        f"{found.rms_mm:.2f} ({found.places})" if found and found.places else "–",
+        f"{found.edge_rms_mm:.1f}" if found and found.edge_places else "–",
+    )
 
 
 def _like(scan: Scan, paper: Scan) -> float:
