@@ -104,7 +104,7 @@ def described(heights: HeightMap) -> FloatArray:
     Raises
     ------
     InputError
-        It has fewer than `FEWEST` heights, or all in one line.
+        It has fewer than `FEWEST` heights.
     """
     points = maps.known(heights)
     if len(points) < FEWEST:
