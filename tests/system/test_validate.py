@@ -132,7 +132,7 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_where_it_was(
     code, _, errors = run(capsys, "--sim", "--targets", "5", "--force", *arguments[3:])
     assert code == 0, errors
     (anew,) = runs_in(out)
-    assert len(anew.logs) == len(anew.visited) == 1
+    assert (len(anew.logs), len(anew.visited)) == (1, 5)
 
 
 def test_a_run_that_ended_before_its_first_bent_target_is_reported(tmp_path: Path) -> None:
