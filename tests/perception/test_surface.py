@@ -13,6 +13,7 @@ from setae.objects import SHAPES, ScanObject, random_object, table_scene
 from setae.perception.measures import away_from_edges, nearness
 from setae.perception.surface import height_mm
 from setae.sim import World, add_solid
+from setae.solids import Prism
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -58,6 +59,39 @@ def test_a_half_felt_object_is_not_complete() -> None:
     assert near.height_rms_mm < 1e-9
     assert near.to_surface_mm < 0.5
     assert near.from_surface_mm > 10
+
+
+def test_a_point_on_a_wall_is_on_the_surface_and_one_in_the_solid_is_not() -> None:
+    # Of what reaches beyond the square a wall was made at its border, if nothing stands at the
+    # opposite one: points 10 mm inside of a solid counted as touched. And walls that are there
+    # could have been left out without a test.
+    table, *_ = table_scene(CONFIG).solids
+    block = Prism(centre_mm=(0.0, 100.0, -110.0), edges_mm=(100.0, 80.0, 40.0))
+    places = np.arange(0.0, 201.0, 10.0)
+    height_mm = np.full((21, 21), np.nan)
+    mark = np.full((21, 21), "empty")
+    distances_mm = {}
+    for name, column in (("border", 0), ("wall", 5)):
+        one_mm, one_mark = height_mm.copy(), mark.copy()
+        one_mm[10, column], one_mark[10, column] = -100.0, "felt"
+        grid = HeightMap(x_mm=places, y_mm=places, height_mm=one_mm, mark=one_mark)
+        distances_mm[name] = nearness(grid, [table, block], reach_mm=REACH_MM).to_surface_mm
+    assert distances_mm["wall"] < 0.5
+    assert distances_mm["border"] == pytest.approx(10.0)
+
+
+def test_a_height_that_was_felt_where_nothing_is_in_reach_is_no_height_error() -> None:
+    # What is not judged was never looked at.
+    what = ScanObject(shape="lidded_container")
+    solids = table_scene(CONFIG, what).solids
+    heights = felt(what, noise_mm=0.0, ragged=0.0)
+    height_mm, mark = heights.height_mm.copy(), heights.mark.copy()
+    height_mm[0, 0], mark[0, 0] = -100.0, "felt"
+    grid = HeightMap(x_mm=heights.x_mm, y_mm=heights.y_mm, height_mm=height_mm, mark=mark)
+    near, right = (nearness(one, solids, reach_mm=REACH_MM) for one in (grid, heights))
+    assert near.places == right.places
+    assert near.height_rms_mm < 1e-9
+    assert near.to_surface_mm > right.to_surface_mm + 0.2
 
 
 @pytest.mark.parametrize("shape", ["eraser", "orange"])

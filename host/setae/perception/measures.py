@@ -121,10 +121,10 @@ def _dense_mm(heights: HeightMap, solids: Sequence[Solid], reach_mm: float) -> F
         np.arange(heights.y_mm[0], heights.y_mm[-1] + _DENSE_MM / 2, _DENSE_MM),
     )
     z = height_mm(solids, x, y)
-    low = z.copy()
-    for axis in (0, 1):
-        for shift in (-1, 1):
-            low = np.minimum(low, np.roll(z, shift, axis=axis))
+    beside = np.pad(z, 1, mode="edge")  # at the square's border nobody knows of a wall
+    low = np.minimum.reduce(
+        [z, beside[:-2, 1:-1], beside[2:, 1:-1], beside[1:-1, :-2], beside[1:-1, 2:]]
+    )
     low = np.maximum(low, reach_mm)
     parts = []
     for down in np.arange(0.0, max(float((z - low).max()), 0.0) + _DENSE_MM, _DENSE_MM):
