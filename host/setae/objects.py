@@ -33,7 +33,7 @@ SCALE_MIN, SCALE_MAX = 0.8, 1.2
 
 # Between the extended tip and the table.
 _TABLE_GAP_MM: Final = 3.0
-_TABLE_EDGE_MM: Final = 1000.0
+_TABLE_EDGE_MM: Final = 5000.0  # below the largest area that may be scanned, and around it
 _TABLE_THICKNESS_MM: Final = 40.0
 
 

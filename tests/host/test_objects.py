@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from setae.config import load
-from setae.errors import InputError
+from setae.config import load, replaced
+from setae.errors import ConfigError, InputError
 from setae.objects import SHAPES, ScanObject, random_object, table_scene
+from setae.perception import surface
 from setae.sim import World, add_solid
 
 AREA_MM = 200.0
@@ -90,6 +91,17 @@ def test_the_table_goes_with_the_lengths_of_the_scan(
     assert over_table_mm == pytest.approx(3.0) or spare_mm == pytest.approx(clearance_mm)
     assert over_table_mm >= 3.0 - 1e-9
     assert spare_mm >= clearance_mm - 1e-9
+
+
+def test_the_table_lies_below_the_largest_area_that_may_be_scanned() -> None:
+    # It ended 500 mm from the first place. Beyond there was nothing, as deep as one may look, and
+    # a study told "invalid value encountered in subtract".
+    config = replaced(load(), {"scan.area_mm": [2000, 2000], "scan.step_mm": 100})
+    scene = table_scene(config)
+    far_mm = np.array(config.scan.area_mm[:1])
+    assert surface.height_mm(scene.solids, far_mm, far_mm)[0] == scene.table_z_mm
+    with pytest.raises(ConfigError, match="area_mm"):
+        replaced(config, {"scan.area_mm": [2001, 2000]})
 
 
 def test_an_area_may_be_an_array() -> None:
