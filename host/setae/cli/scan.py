@@ -61,7 +61,8 @@ def scan(
         the same map in less time. Several times: one scan each, side by side in the report.
     object
         What the simulated robot scans: lidded_container, open_container, eraser, coil, orange, or
-        none. SHAPE:SEED gives another size, place and turn; --seed has nothing to do with them.
+        none; eraser by itself. SHAPE:SEED gives another size, place and turn; --seed has nothing
+        to do with them.
     scene
         Instead: a TOML file that says what stands where.
     area
