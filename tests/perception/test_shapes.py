@@ -179,6 +179,31 @@ def test_the_papers_data_begin_at_the_least_touched_x_and_y() -> None:
     assert grid.max() == pytest.approx(25, abs=0.5)
 
 
+def test_the_papers_data_of_a_finer_scan_are_means() -> None:
+    # Nothing looked at scans with a step other than the paper's: sums would have done.
+    what = ScanObject(shape="lidded_container")
+    coarse, fine = (
+        paper.normalised(felt(what, noise_mm=0.0, ragged=0.0, step_mm=step_mm), reach_mm=REACH_MM)
+        for step_mm in (10.0, 2.5)
+    )
+    assert fine.max() == pytest.approx(coarse.max())
+
+
+def test_a_single_height_far_above_the_others_is_not_the_top() -> None:
+    # Nothing held the top to be the 98th of a hundred heights: the highest would have done.
+    one = felt(ScanObject(shape="lidded_container"), noise_mm=0.0, ragged=0.0)
+    height_mm = one.height_mm.copy()
+    felt_at = np.argwhere(np.isfinite(height_mm))
+    assert len(felt_at) > 50
+    height_mm[tuple(felt_at[20])] += 25.0
+    spiked = HeightMap(x_mm=one.x_mm, y_mm=one.y_mm, height_mm=height_mm, mark=one.mark)
+    change = np.abs(scaled(described(spiked)) - scaled(described(one)))
+    relief, high_share = (
+        [feature.name for feature in FEATURES].index(name) for name in ("relief_log", "high_share")
+    )
+    assert change[[relief, high_share]].max() < 0.1
+
+
 def test_t_sne_is_the_same_again_and_takes_few_trials(maps: list[HeightMap]) -> None:
     data = np.stack([paper.normalised(heights, reach_mm=REACH_MM) for heights in maps])
     plane = paper.embedded(data)

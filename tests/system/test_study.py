@@ -62,6 +62,26 @@ def test_a_failed_run_is_told_and_the_others_go_on(tmp_path: Path) -> None:
 
     assert conduct(runs, tmp_path, workers=1, task=noted)[0] == rows[0]
     assert tried == [runs[1].name]
+    assert [sample.name for sample in samples.read(tmp_path)] == [runs[0].name]
+
+
+def test_a_run_is_scanned_in_its_own_mode_with_its_own_seed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # With one mode and one seed for all runs the tests passed, and a study would have compared
+    # nothing.
+    given: list[tuple[str, int]] = []
+
+    def simulate(*_: object, mode: str, seed: int, **__: object) -> None:
+        given.append((mode, seed))
+        raise SetaeError("That will do.")
+
+    monkeypatch.setattr("setae.experiments.study.one.simulate", simulate)
+    runs = plan(seeds=2, modes=["paper", "safe", "adaptive"]).runs()
+    for run in runs:
+        perform(run)
+    assert given == [(run.mode, run.seed) for run in runs]
+    assert len(set(given)) == 6
 
 
 def test_a_table_has_a_line_for_each_run(tmp_path: Path) -> None:
