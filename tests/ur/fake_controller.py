@@ -98,6 +98,7 @@ class Fake:
     acceleration: float = 1.0
     braking: bool = False
     remote: bool = True
+    mute: bool = False
     robot_mode: int = 7
     safety_mode: int = 1
     playing: bool = False
@@ -113,6 +114,8 @@ class Fake:
         word, _, rest = line.strip().partition(" ")
         if word == "local":
             self.remote = False
+        elif word == "mute":
+            self.mute = True
         elif word == "safety":
             self.safety_mode = int(rest)
             self.playing = self.playing and self.safety_mode in (1, 2)
@@ -139,6 +142,7 @@ class Fake:
             "move": self.move,
             "brake": self.brake,
             "watchdog_hz": self.watchdog_hz,
+            "playing": self.playing,
         }
 
     def halt(self) -> None:
@@ -268,6 +272,8 @@ async def rtde(fake: Fake, reader: asyncio.StreamReader, writer: asyncio.StreamW
         while True:
             size, command = struct.unpack(">HB", await reader.readexactly(3))
             payload = await reader.readexactly(size - 3)
+            if fake.mute:
+                continue
             if command == ord("V"):
                 send(command, b"\1")
             elif command == ord("v"):

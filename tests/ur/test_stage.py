@@ -32,6 +32,7 @@ from setae.errors import (
 from setae.experiments.reach import require_reachable
 from setae.ur import UrStage
 from setae.ur.pose import WorldFrame, rotation
+from setae.ur.process import Job, Method
 from setae.ur.watch import Watch
 
 TIMEOUT_S = 60.0
@@ -233,34 +234,17 @@ def test_a_computer_that_stalls_does_not_blame_the_controller() -> None:
 
 
 def test_a_state_that_the_library_cannot_tell_counts_as_unseen() -> None:
-    """Its exception ended the watching thread without a word: a controller that froze afterwards
-    was never noticed.
+    """It ended the watching thread without a word: a controller that froze afterwards was never
+    noticed.
     """
-
-    def missing() -> float:
-        raise RuntimeError("unable to get state data for specified key: timestamp")
-
     clock = itertools.count(100.0, 0.01)
-    watch = Watch(missing, lambda: next(clock))
+    watch = Watch(lambda: None, lambda: next(clock))
     watch.start()
     end_s = time.monotonic() + TIMEOUT_S
     while watch.unseen_s < 0.1:  # ten looks of the thread
         assert time.monotonic() < end_s
         time.sleep(0.005)
     watch.close()
-
-
-class Refusing:
-    """The library's control, which fails at every sign of life, and only there."""
-
-    def __init__(self, control: Any) -> None:
-        self._control = control
-
-    def kickWatchdog(self) -> None:  # noqa: N802  # the library's name
-        raise RuntimeError("RTDEControlInterface: refused")
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._control, name)
 
 
 def test_an_arm_whose_controller_fails_at_a_call_is_braked(
@@ -272,8 +256,15 @@ def test_an_arm_whose_controller_fails_at_a_call_is_braked(
     with connected(fake) as stage:
         stage.move_to((0, 0, -80))
         poll_until(stage, lambda: far_on_its_way(stage))
-        controller = stage._controller
-        monkeypatch.setattr(controller, "_control", Refusing(controller._control))
+        submit = stage._process.submit
+
+        def refuse(what: str, method: Method, *arguments: object) -> Job:
+            job = submit(what, method, *arguments)
+            if method == "kick_watchdog":
+                job.finish(ArmFrozenError("The controller failed at a sign of life: refused."))
+            return job
+
+        monkeypatch.setattr(stage._process, "submit", refuse)
         with pytest.raises(ArmFrozenError, match="failed at a sign of life"):
             poll_until(stage, lambda: False)
         assert fake.told()["brake"] == 0
@@ -287,8 +278,9 @@ def test_closing_twice_says_goodbye_once(
     """The second close handed its goodbye to a worker that had ended, and waited in vain."""
     with connected(fake) as stage:
         stage.close()
+        assert not fake.told()["playing"], "the program on the controller goes on"
         submitted: list[str] = []
-        monkeypatch.setattr(stage._worker, "submit", lambda what, _: submitted.append(what))
+        monkeypatch.setattr(stage._process, "submit", lambda what, _: submitted.append(what))
         stage.close()
     assert not submitted
 
@@ -344,10 +336,9 @@ def test_the_controllers_watchdog_stops_the_arm_of_a_host_that_hangs(
         stage.move_to((0, 0, -300), speed_mm_s=20)
         poll_until(stage, lambda: far_on_its_way(stage))
         # The host hangs: nobody polls, and after a fifth of a second the controller acts.
-        controller = stage._controller
         end_s = time.monotonic() + TIMEOUT_S
         # Two connections tell of it: one may be a report behind the other.
-        while controller.program_runs() or controller.state().speed_mm_s != 0:
+        while (state := stage._process.state).program_runs or state.speed_mm_s != 0:
             assert time.monotonic() < end_s
             time.sleep(0.005)
         assert stage.position_mm[2] > -100
@@ -358,9 +349,8 @@ def test_a_pause_of_the_host_at_rest_costs_nothing(fake: FakeController) -> None
     next move was refused.
     """
     with connected(fake, watchdog_hz=5.0) as stage:
-        controller = stage._controller
         end_s = time.monotonic() + TIMEOUT_S
-        while controller.program_runs():
+        while stage._process.state.program_runs:
             assert time.monotonic() < end_s
             time.sleep(0.005)
         stage.move_to((0, 0, -5))

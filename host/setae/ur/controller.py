@@ -62,6 +62,8 @@ class ArmState:
         Of frame D's origin.
     robot_mode, safety_mode
         UR's numbers.
+    program_runs
+        Whether it takes moves.
     """
 
     timestamp_s: float
@@ -69,6 +71,7 @@ class ArmState:
     speed_mm_s: float
     robot_mode: int
     safety_mode: int
+    program_runs: bool
 
 
 def check(state: ArmState) -> None:
@@ -100,7 +103,9 @@ def _load_libraries() -> _Libraries:
 
 
 class Controller:
-    """A UR controller. Every method but `state` may hang: call it in a `Worker`.
+    """A UR controller. Every method but `state` may hang, some with Python's lock held.
+
+    So it lives in a process of its own (`setae.ur.child`).
 
     Parameters
     ----------
@@ -194,19 +199,15 @@ class Controller:
         receive = self._receive
         x, y, z, *turn = receive.getActualTCPPose()
         return ArmState(
-            timestamp_s=self.timestamp_s(),
+            timestamp_s=receive.getTimestamp(),
             pose=(1000 * x, 1000 * y, 1000 * z, *turn),
             speed_mm_s=1000 * math.hypot(*receive.getActualTCPSpeed()[:3]),
             robot_mode=receive.getRobotMode(),
             safety_mode=receive.getSafetyMode(),
+            program_runs=self._control is not None and self._control.isProgramRunning(),
         )
 
-    def timestamp_s(self) -> float:
-        """The controller's time when it last told; never waits."""
-        return float(self._receive.getTimestamp())
-
-    def program_runs(self) -> bool:
-        """Whether the controller still takes moves; never waits."""
+    def _program_runs(self) -> bool:
         return bool(self._call("its program", self._control.isProgramRunning))
 
     def kick_watchdog(self) -> None:
@@ -222,7 +223,7 @@ class Controller:
             The controller did not take it.
         """
         # A watchdog that was not fed between two moves ended the program.
-        if not self.program_runs():
+        if not self._program_runs():
             self._call("a new program", self._control.reuploadScript)
             self._wait_for_program()
             self._call("its load", self._prepare)
@@ -237,7 +238,7 @@ class Controller:
     def _wait_for_program(self) -> None:
         """The upload comes back before the program runs; until then commands fail."""
         end_s = time.monotonic() + self._settings.command_deadline_s / 2
-        while not self.program_runs():
+        while not self._program_runs():
             if time.monotonic() > end_s:
                 raise ArmStoppedError("The arm's controller does not start its program.")
             time.sleep(_PROGRAM_POLL_S)
@@ -247,9 +248,6 @@ class Controller:
         self._call("a stop", lambda: self._control.stopL(deceleration_mm_s2 / 1000, True))
 
     def close(self) -> None:
-        """End the program on the controller and let go of it."""
+        """End the program on the controller; the connections end with the process."""
         if self._control is not None:
             self._control.stopScript()
-            self._control.disconnect()
-        if self._receive is not None:
-            self._receive.disconnect()

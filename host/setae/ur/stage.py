@@ -1,8 +1,8 @@
 """A UR arm as a `setae.stage.Stage`.
 
-Nothing here waits for the arm: moves are started and then watched. The library's calls
-are made in a thread of their own (`setae.ur.worker`), and the age of the controller's
-state is what tells that it lives.
+Nothing here waits for the arm: moves are started and then watched. The library lives in a
+process of its own (`setae.ur.process`), and the age of the controller's state is what
+tells that it lives.
 """
 
 from __future__ import annotations
@@ -26,17 +26,18 @@ from setae.errors import (
     StageError,
 )
 from setae.stage import checked_move
-from setae.ur.controller import ArmState, Controller, check
+from setae.ur.controller import ArmState, check
 from setae.ur.pose import WorldFrame
+from setae.ur.process import ArmProcess, Job
 from setae.ur.watch import Watch
-from setae.ur.worker import Job, Worker
 
 __all__ = ["SCHEME", "UrStage"]
 
 SCHEME: Final = "ur://"
 
 _CONNECT_TIMEOUT_S: Final = 15.0
-_GOODBYE_TIMEOUT_S: Final = 3.0  # the library takes more than one
+_GOODBYE_TIMEOUT_S: Final = 3.0
+_STATE_POLL_S: Final = 0.002
 # Arrived: this near, this slow. The controller itself is ten times as exact.
 _NEAR_MM: Final = 0.2
 _REST_MM_S: Final = 1.0
@@ -47,7 +48,7 @@ _STUCK_S: Final = 1.0
 @dataclass(slots=True)
 class _Move:
     target_mm: tuple[float, float, float]
-    job: Job[None]
+    job: Job
     resting_since_s: float | None = None
 
 
@@ -96,12 +97,11 @@ class UrStage:
         self._failure: StageError | None = None
         self._lost = False  # it tells nothing, or answers no more: a brake won't reach it
         self._closed = False
-        self._worker = Worker(clock)
-        self._controller = Controller(host, config.ur)
-        self._watch = Watch(self._controller.timestamp_s, clock)
+        self._process = ArmProcess(host, config.ur, clock)
+        self._watch = Watch(lambda: self._process.told_s, clock)
+        self._connecting = self._process.submit("connecting", "connect")
         try:
-            connecting = self._worker.submit("connecting", self._controller.connect)
-            connecting.wait(_CONNECT_TIMEOUT_S)
+            self._connecting.wait(_CONNECT_TIMEOUT_S)
             self._state = self._settled_state()
             self._world = WorldFrame.at(self._state.pose)
             self._require_straight()
@@ -112,23 +112,21 @@ class UrStage:
             self.close()
             raise
         self._move: _Move | None = None
-        self._braking: Job[None] | None = None
-        self._kick: Job[None] | None = None
+        self._braking: Job | None = None
+        self._kick: Job | None = None
 
     def _settled_state(self) -> ArmState:
         """A state in which frame D is what the configuration says: two states on."""
-        state = self._controller.state()
         end_s = self._clock() + self._settings.command_deadline_s
-        seen = 0
-        while seen < 2:
-            newer = self._worker.submit("its state", self._controller.state).wait(
-                self._settings.command_deadline_s
-            )
-            seen += newer.timestamp_s != state.timestamp_s
-            state = newer
+        told_s: set[float | None] = {None}
+        while len(told_s) <= 3:
+            if self._process.ended is not None:
+                raise ArmFrozenError(self._process.ended)
             if self._clock() > end_s:
                 raise ArmFrozenError("The arm's controller answers, but does not tell its state.")
-        return state
+            time.sleep(_STATE_POLL_S)
+            told_s.add(self._process.told_s)
+        return self._process.state
 
     def _require_straight(self) -> None:
         tilt_deg = math.degrees(self._world.tilt_rad)
@@ -215,10 +213,7 @@ class UrStage:
             raise StageError("The arm is moving already.", "Wait for it, or stop it first.")
         self.require_reachable(move.target_mm)
         pose = [*self.base_mm(move.target_mm), *self._state.pose[3:]]
-        job = self._worker.submit(
-            "a move",
-            lambda: self._controller.move(pose, move.speed_mm_s, move.acceleration_mm_s2),
-        )
+        job = self._process.submit("a move", "move", pose, move.speed_mm_s, move.acceleration_mm_s2)
         self._move = _Move(move.target_mm, job)
 
     def stop(self) -> None:
@@ -234,7 +229,7 @@ class UrStage:
             raise self._failure
         self._move = None
         deceleration = self._config.stage.acceleration_mm_s2
-        braking = self._worker.submit("a stop", lambda: self._controller.brake(deceleration))
+        braking = self._process.submit("a stop", "brake", deceleration)
         # Once the arm has failed, nobody looks at what becomes of it.
         self._braking = braking if self._failure is None else None
 
@@ -253,12 +248,15 @@ class UrStage:
             self._look()
         except StageError as failure:
             self._failure = failure
+            self._lost = self._lost or self._process.ended is not None
             self._move = self._braking = None
             raise
 
     def _look(self) -> None:
         now_s = self._clock()
-        self._state = state = self._controller.state()
+        if self._process.ended is not None:
+            raise self._lose(self._process.ended)
+        self._state = state = self._process.state
         unseen_s = self._watch.unseen_s
         if unseen_s > self._settings.state_age_s:
             raise self._lose(f"The arm's controller has told nothing for {unseen_s:.2f} s.")
@@ -273,10 +271,10 @@ class UrStage:
         if self._kick is not None:
             if not self._kick.done:
                 return
-            self._kick.result()
-        self._kick = self._worker.submit("a sign of life", self._controller.kick_watchdog)
+            self._kick.check()
+        self._kick = self._process.submit("a sign of life", "kick_watchdog")
 
-    def _watch_braking(self, braking: Job[None], now_s: float) -> None:
+    def _watch_braking(self, braking: Job, now_s: float) -> None:
         if self._taken(braking, now_s) and self._state.speed_mm_s < _REST_MM_S:
             self._braking = None
 
@@ -293,15 +291,15 @@ class UrStage:
         elif now_s - move.resting_since_s > _STUCK_S:
             why = (
                 "the speed slider may be at zero"
-                if self._controller.program_runs()
+                if self._state.program_runs
                 else "its program has ended"
             )
             raise ArmStoppedError(f"The arm rests {left_mm:.1f} mm before its target: {why}.")
 
-    def _taken(self, job: Job[None], now_s: float) -> bool:
+    def _taken(self, job: Job, now_s: float) -> bool:
         """Whether the controller took a command; raises where it takes too long, or failed."""
         if job.done:
-            job.result()
+            job.check()
             return True
         if now_s - job.submitted_s > self._settings.command_deadline_s:
             raise self._lose(
@@ -312,6 +310,7 @@ class UrStage:
 
     def _lose(self, why: str) -> ArmFrozenError:
         self._lost = True
+        self._process.kill()  # the library would look for the controller for ever
         return ArmFrozenError(why)
 
     # -------------------------------------------------------------------------- closing
@@ -322,12 +321,10 @@ class UrStage:
             return
         self._closed = True
         self._watch.close()
-        goodbye = self._worker.submit("goodbye", self._controller.close)
-        self._worker.close()
-        if self._lost:  # it never answers
-            return
-        with contextlib.suppress(StageError, RuntimeError):
-            goodbye.wait(_GOODBYE_TIMEOUT_S)
+        if self._connecting.done and not self._lost:  # else it does not answer
+            with contextlib.suppress(StageError, RuntimeError):
+                self._process.submit("goodbye", "close").wait(_GOODBYE_TIMEOUT_S)
+        self._process.close()
 
     def __enter__(self) -> Self:
         return self

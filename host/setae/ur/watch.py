@@ -23,12 +23,12 @@ class Watch:
     Parameters
     ----------
     timestamp_s
-        The controller's time when it last told; never waits.
+        The controller's time when it last told, or None; never waits.
     clock
         Seconds, of the host.
     """
 
-    def __init__(self, timestamp_s: Callable[[], float], clock: Callable[[], float]) -> None:
+    def __init__(self, timestamp_s: Callable[[], float | None], clock: Callable[[], float]) -> None:
         self._timestamp_s = timestamp_s
         self._clock = clock
         self._last_s: float | None = None
@@ -44,7 +44,7 @@ class Watch:
 
     def start(self) -> None:
         """Begin; what the controller has told so far is new."""
-        self._last_s, self._looked_s = self._told_s(), self._clock()
+        self._last_s, self._looked_s = self._timestamp_s(), self._clock()
         self._thread.start()
 
     def close(self) -> None:
@@ -55,18 +55,12 @@ class Watch:
 
     def look(self) -> None:
         """Look once; the thread does."""
-        told_s, now_s = self._told_s(), self._clock()
+        told_s, now_s = self._timestamp_s(), self._clock()
         gap_s, self._looked_s = now_s - self._looked_s, now_s
         if told_s is not None and told_s != self._last_s:
             self._last_s, self._unseen_s = told_s, 0.0
         else:
             self._unseen_s += min(gap_s, _GAP_MAX_S)
-
-    def _told_s(self) -> float | None:
-        try:
-            return self._timestamp_s()
-        except Exception:  # the library's; it must not end the thread, and nothing new was seen
-            return None
 
     def _run(self) -> None:
         while not self._ended.wait(_PERIOD_S):

@@ -1,0 +1,151 @@
+"""The process in which the UR library lives: what it keeps from the host, and when it ends."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+import pytest
+from tests.ur.controller import FakeController, controller
+from tests.ur.test_stage import TIMEOUT_S, connected, far_on_its_way, poll_until, with_ur
+
+from setae.errors import ArmFrozenError, StageError
+from setae.ur import UrStage
+
+# As a user's script is: without a guard against being imported.
+SCRIPT = """
+import dataclasses, sys, time
+from setae.config import load
+from setae.ur import UrStage
+from tests.ur.controller import patient
+
+config = load()
+settings = dataclasses.replace(patient(config.ur), watchdog_hz=5.0)
+stage = UrStage(sys.argv[1], dataclasses.replace(config, ur=settings))
+stage.move_to((0, 0, -300), speed_mm_s=20)
+try:
+    print(stage._process.pid, flush=True)
+    while True:
+        stage.poll(0)
+        time.sleep(0.005)
+except KeyboardInterrupt:
+    stage.stop()
+    while stage.moving:
+        stage.poll(0)
+        time.sleep(0.005)
+    print("rests", flush=True)
+"""
+
+
+def line(pipe: IO[str]) -> str:
+    readable, _, _ = select.select([pipe], [], [], TIMEOUT_S)
+    assert readable
+    return pipe.readline()
+
+
+@contextmanager
+def script(fake: FakeController) -> Iterator[subprocess.Popen[str]]:
+    with subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, fake.url],
+        cwd=Path(__file__).parents[2],
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,  # as in a terminal, a group that hears Ctrl-C
+    ) as host:
+        try:
+            yield host
+        finally:
+            host.kill()
+
+
+@pytest.mark.parametrize("happens", [FakeController.freeze, FakeController.close])
+def test_a_lost_controller_is_looked_for_by_nobody(
+    fake: FakeController,
+    happens: Callable[[FakeController], None],
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """The library's threads went on looking for it: they took Python's lock from the next stage
+    of the same program, and printed lines of their own into notebooks and progress bars.
+    """
+    with controller() as lost:
+        with connected(lost, state_age_s=1.0) as stage:
+            stage.move_to((0, 0, -80))
+            poll_until(stage, lambda: far_on_its_way(stage))
+            happens(lost)
+            with pytest.raises(StageError):
+                poll_until(stage, lambda: False)
+        with connected(fake, state_age_s=1.0, command_deadline_s=2.0) as stage:
+            stage.move_to((0, 0, -5))
+            poll_until(stage, lambda: not stage.moving)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_controller_that_freezes_while_it_is_connected_to_holds_up_nobody(
+    fake: FakeController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The library waits for it with Python's lock held: the whole program stood still for ever,
+    whatever its deadline.
+    """
+    with controller() as mute, monkeypatch.context() as quick:
+        mute.tell("mute")
+        quick.setattr("setae.ur.stage._CONNECT_TIMEOUT_S", 3.0)
+        with pytest.raises(ArmFrozenError, match="did not answer within 3 s: connecting"):
+            UrStage(mute.url, with_ur())
+    with connected(fake):
+        pass
+
+
+def test_a_library_that_ends_is_told(fake: FakeController) -> None:
+    """Without it nobody would brake, or say why."""
+    with connected(fake) as stage:
+        stage.move_to((0, 0, -80))
+        poll_until(stage, lambda: far_on_its_way(stage))
+        os.kill(stage._process.pid, signal.SIGKILL)
+        with pytest.raises(ArmFrozenError, match=r"process that talks to .* ended") as caught:
+            poll_until(stage, lambda: False)
+        assert "exit code -9" in caught.value.problem
+        with pytest.raises(ArmFrozenError):
+            stage.stop()
+
+
+def test_a_library_that_hangs_holds_up_nobody(fake: FakeController) -> None:
+    with connected(fake, state_age_s=1.0) as stage:
+        os.kill(stage._process.pid, signal.SIGSTOP)
+        with pytest.raises(ArmFrozenError, match="has told nothing for"):
+            poll_until(stage, lambda: False)
+
+
+def test_a_host_that_is_killed_takes_the_library_along(fake: FakeController) -> None:
+    """A process that outlived it could go on telling the controller that the host lives."""
+    with script(fake) as host:
+        assert host.stdout is not None
+        library = os.pidfd_open(int(line(host.stdout)))
+        try:
+            host.kill()
+            ended, _, _ = select.select([library], [], [], TIMEOUT_S)
+            assert ended
+        finally:
+            os.close(library)
+    end_s = time.monotonic() + TIMEOUT_S
+    while fake.told()["playing"]:
+        assert time.monotonic() < end_s, "the controller's watchdog was fed by somebody"
+        time.sleep(0.01)
+
+
+def test_ctrl_c_leaves_the_host_an_arm_that_it_can_brake(fake: FakeController) -> None:
+    """It reaches every process of a terminal's or notebook's group."""
+    with script(fake) as host:
+        assert host.stdout is not None
+        line(host.stdout)
+        os.killpg(host.pid, signal.SIGINT)
+        assert line(host.stdout) == "rests\n"
+        assert host.wait(TIMEOUT_S) == 0
+    assert fake.told()["brake"] == pytest.approx(0.2)
