@@ -14,8 +14,10 @@ from setae import rig
 from setae.config import load
 from setae.errors import ArmFrozenError
 from setae.link.events import Event, Tripped
+from setae.link.session import Session
+from setae.robot import Robot
 from setae.scene import Obstacle, tube_scene
-from setae.sim import World
+from setae.sim import Follower, SimTransport, World, add_solid
 from setae.ur import UrStage
 
 FREEZES = 10
@@ -42,36 +44,36 @@ def freeze_detect_ms(fake: FakeController) -> float:
             return 1000 * (time.monotonic() - frozen_s)
 
 
-class _TrueTouch:
-    """When the simulated bristle first touched something, in real time.
+class _TouchedWorld(World):
+    """Notes when its bristle first touched something, in real time.
 
-    The world runs ahead of real time by a slice, and its line waits for the rest: so its time
-    is real time and a constant, which the least of their differences is.
+    It runs ahead of real time by a slice, and its line waits for the rest: so its time is real
+    time and a constant, which the least of their differences is.
     """
 
-    def __init__(self, world: World) -> None:
-        self._world = world
-        self._run = world.run
-        self._behind_s = math.inf
-        self._touched_us: int | None = None
-        world.run = self._run_finely  # type: ignore[method-assign]
+    watched = False
+    _behind_s = math.inf
+    _touched_us: int | None = None
 
     def note_time(self, _: Event) -> None:
         """Compare the clocks; where the line has just waited."""
-        self._behind_s = min(self._behind_s, time.monotonic() - self._world.now_us / 1e6)
+        self._behind_s = min(self._behind_s, time.monotonic() - self.now_us / 1e6)
 
     @property
-    def monotonic_s(self) -> float:
+    def touched_s(self) -> float:
+        """By the monotonic clock."""
         assert self._touched_us is not None
         return self._touched_us / 1e6 + self._behind_s
 
-    def _run_finely(self, until_us: int) -> bytes:
+    def run(self, until_us: int) -> bytes:
+        """Step, and look each millisecond."""
+        if not self.watched:
+            return super().run(until_us)
         while True:
-            now_us = self._world.now_us
-            data = self._run(min(until_us, now_us + _LOOK_US))
-            if self._touched_us is None and self._world.truth().contact_depth_mm > 0:
-                self._touched_us = self._world.now_us
-            if data or self._world.now_us >= until_us:
+            data = super().run(min(until_us, self.now_us + _LOOK_US))
+            if self._touched_us is None and self.truth().contact_depth_mm > 0:
+                self._touched_us = self.now_us
+            if data or self.now_us >= until_us:
                 return data
 
 
@@ -92,42 +94,43 @@ def arm_stop_ms(fake: FakeController) -> tuple[float, float]:
         if isinstance(event, Tripped):
             tripped_s.append(time.monotonic())
 
-    with rig.open(
-        "sim://",
-        config=config,
-        scene=dataclasses.replace(scene, box=below),
-        stage=fake.url,
-        leave="hold",  # the bristle still touches
-    ) as opened:
-        robot, stage = opened.robot, opened.stage
-        assert opened.world is not None
-        robot.session.subscribe(note)
-        robot.enable()
-        robot.compress(config.explore.compressed_length_mm)
-        touch = _TrueTouch(opened.world)
-        robot.session.subscribe(touch.note_time)
-        robot.hold_guarded(
-            begin=lambda: stage.move_to((0, 0, -100)),
-            busy=lambda: stage.moving,
-            abort=stage.stop,
-            timeout_s=10,
+    world = _TouchedWorld(parameters=rig.simulator_parameters(config, 0))
+    for solid in dataclasses.replace(scene, box=below).solids:
+        add_solid(world, solid)
+    world.start()
+    with UrStage(fake.url, config) as stage:
+        session = Session(
+            SimTransport(world, speed=1.0), session_id=1, pollables=[stage, Follower(world, stage)]
         )
-        robot.wait(lambda: not stage.moving, timeout_s=10, what="the arm to rest")
-        rest_s = time.monotonic()
-    return 1000 * (rest_s - tripped_s[0]), 1000 * (rest_s - touch.monotonic_s)
+        session.open()
+        with Robot(session, config, leave="hold") as robot:  # the bristle still touches
+            robot.prepare()
+            session.subscribe(note)
+            robot.enable()
+            robot.compress(config.explore.compressed_length_mm)
+            world.watched = True
+            session.subscribe(world.note_time)
+            robot.hold_guarded(
+                begin=lambda: stage.move_to((0, 0, -100)),
+                busy=lambda: stage.moving,
+                abort=stage.stop,
+                timeout_s=10,
+            )
+            robot.wait(lambda: not stage.moving, timeout_s=10, what="the arm to rest")
+            rest_s = time.monotonic()
+    return 1000 * (rest_s - tripped_s[0]), 1000 * (rest_s - world.touched_s)
 
 
 def figures() -> Iterable[Figure]:
     """Against the stand-in for the controller, in real time."""
-    # First: the library's threads go on looking for frozen controllers, and cost it time.
-    stops = []
-    for _ in range(CONTACTS):
-        with controller() as fake:
-            stops.append(arm_stop_ms(fake))
     worst_ms = 0.0
     for _ in range(FREEZES):
         with controller() as fake:
             worst_ms = max(worst_ms, freeze_detect_ms(fake))
+    stops = []
+    for _ in range(CONTACTS):
+        with controller() as fake:
+            stops.append(arm_stop_ms(fake))
     yield Figure(
         "ur_freeze_detect_ms_max",
         round(worst_ms, 1),

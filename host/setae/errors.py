@@ -386,7 +386,8 @@ class ArmSafetyError(StageError):
 class ArmFrozenError(StageError):
     """The controller has stopped telling where the arm is, or takes no commands.
 
-    Examples of when it happens: the controller crashed, the network broke.
+    Examples of when it happens: the controller crashed, the network broke, the process that
+    talks to it was killed.
     """
 
     default_remedy = (
