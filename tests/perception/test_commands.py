@@ -149,6 +149,11 @@ def test_a_report_without_truth_has_no_measures_against_it(
     assert found.nearness == (None,) * len(given)
     page = pages.write(found, tmp_path).page.read_text()
     assert "Chamfer distance" not in page
+    # That unknown counts as wrong was said beside the figure, and by no test.
+    assert found.accuracy == 1.0
+    unknown = dataclasses.replace(found.answers[0], known=False)
+    doubted = dataclasses.replace(found, answers=(unknown, *found.answers[1:]))
+    assert doubted.accuracy == pytest.approx(1 - 1 / len(given))
     with pytest.raises(InputError, match="nothing to compare"):
         compare(found.samples[:2])
 

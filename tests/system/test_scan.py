@@ -369,6 +369,8 @@ def test_reading_a_log_gives_what_the_scan_gave(tmp_path: Path) -> None:
     again = read(tmp_path)
     assert_same(again, result)
     assert again.scene["object"]["shape"] == "eraser"
+    for place in again.places:
+        assert np.isfinite(place.uncertainty_mm) == (place.mark in TOUCHED)
     empty = tmp_path / "empty"
     empty.mkdir()
     with pytest.raises(LogError, match="holds no log"):
