@@ -189,6 +189,18 @@ def test_dragged_over_an_edge_it_slips_off_and_springs_back() -> None:
     assert abs(found.hpa[-1]) < 0.5
 
 
+def test_dragged_back_it_lags_less_than_on_the_way_there() -> None:
+    # Friction that for ever pulled to where a sliding tip touched first passed all tests.
+    found = touch(
+        floor, (-15, 0, 0), (-15, 0, -21), (15, 0, -21), (0, 0, -21),
+        parameters={"bristle.friction": 0.1},
+    )  # fmt: skip
+    lag_mm = found.arm_mm[:, 0] - found.tip_mm[:, 0]
+    turn = int(found.arm_mm[:, 0].argmax())
+    assert lag_mm[turn - 20 : turn].min() > 6
+    assert lag_mm[-20:].max() < 5
+
+
 def felt_at_mm(off_mm: float, friction: float = 0.4) -> float:
     """Height error of a touch from above, that far from the ball's middle; NaN: not felt."""
     found = touch(

@@ -243,3 +243,16 @@ def test_the_truth_is_never_an_old_one() -> None:
     world.close()
     with pytest.raises(SimulationError):
         world.truth()
+
+
+def test_an_arm_that_is_stopped_too_late_for_its_braking_ends_at_its_target() -> None:
+    # One that went on beyond, as far as the asked braking took it, passed all tests.
+    with World(seed=1) as world:
+        world.start()
+        world.arm_move((0.0, 0.0, -20.0), 50.0, 400.0)
+        while world.arm_mm[2] > -18.5:
+            world.run(world.now_us + 1000)
+        world.arm_stop(10.0)
+        while world.arm_moving:
+            world.run(world.now_us + 1000)
+        assert world.arm_mm == pytest.approx((0, 0, -20))
