@@ -281,21 +281,38 @@ def test_a_real_scan_says_that_its_height_window_is_not_checked(
     assert "Nobody said" not in capsys.readouterr().err
 
 
+def test_a_scene_without_its_table_has_it_low_enough_for_what_stands_on_it(
+    tmp_path: Path,
+) -> None:
+    # It lay as if nothing stood on it, and a tall object was refused.
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[object]\nshape = "orange"\nscale = 1.0\nx_mm = 80\ny_mm = 0\nyaw_deg = 0\n')
+    out = tmp_path / "run"
+    main_ends(
+        0, "scan", "--sim", "--scene", str(scene), "--area", "80x40", "--step", "40", "--out",
+        str(out), "--no-report",
+    )  # fmt: skip
+    assert record.read(out / "paper.mcap").metadata["scene"]["table_z_mm"] == -158.0
+
+
 def test_the_map_grows_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
     terminal = Console(file=screen, force_terminal=True, width=100)
     monkeypatch.setattr(live_map, "console", terminal)
     monkeypatch.setattr(live_map, "_REDRAW_S", 0.0)
     with live_map.LiveMap() as live:
-        live.event(Event(time_us=0, name="scan_start", data={"columns": 2, "rows": 1, "known": 0}))
-        for column, mark, height_mm in ((0, "lost", None), (1, "felt", -100.0)):
+        live.event(Event(time_us=0, name="scan_start", data={"columns": 4, "rows": 1, "known": 1}))
+        for column, mark, height_mm in ((1, "lost", None), (2, "empty", None), (3, "felt", -100.0)):
             place = {"column": column, "row": 0, "x_mm": 10.0 * column, "y_mm": 0.0, "mark": mark,
                      "height_mm": height_mm, "uncertainty_mm": None}  # fmt: skip
-            known = {"known": column + 1, "total": 2}
-            live.event(Event(time_us=5_000_000, name="place", data={**place, **known}))
+            known = {"known": column + 1, "total": 4}
+            time_us = 50_000_000 + 5_000_000 * column
+            live.event(Event(time_us=time_us, name="place", data={**place, **known}))
     drawn = screen.getvalue()
-    assert "50%  1 of 2 places, 0 touched, 0:05 robot time, about 0:05 left" in drawn
-    assert "100%  2 of 2 places, 1 touched" in drawn
+    # The way to a resumed run's first place counted as a place's: hours were left.
+    assert "50%  2 of 4 places, 0 touched, 0:55 robot time\r" in drawn
+    assert "75%  3 of 4 places, 0 touched, 1:00 robot time, about 0:05 left" in drawn
+    assert "100%  4 of 4 places, 1 touched" in drawn
     assert "L " in drawn, "a lost contact is flagged"
 
 

@@ -36,7 +36,7 @@ class LiveMap:
         self._columns = self._rows = 0
         self._total = 1
         self._start_us = 0
-        self._before = 0
+        self._first: tuple[int, int] | None = None  # when this run's first place was known
         self._drawn_s = -math.inf
         self._told_share = 0.0
         self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
@@ -66,7 +66,7 @@ class LiveMap:
         if event.name == "scan_start":
             self._columns, self._rows = data["columns"], data["rows"]
             self._total = self._columns * self._rows
-            self._start_us, self._before = event.time_us, data["known"]
+            self._start_us = event.time_us
         elif event.name == "place":
             place = Place.of(data, event.time_us)
             self._places[place.cell] = place
@@ -75,10 +75,11 @@ class LiveMap:
     def _show(self, data: Mapping[str, Any], time_us: int) -> None:
         known, total = data["known"], data["total"]
         took_s = (time_us - self._start_us) / 1e6
-        left_s = took_s / max(known - self._before, 1) * (total - known)
+        left_s = self._left_s(data, time_us)
+        left = "" if left_s is None else f", about {_clock(left_s)} left"
         line = (
             f"{known / total:4.0%}  {known} of {counted(total, 'place')}, "
-            f"{self._touched()} touched, {_clock(took_s)} robot time, about {_clock(left_s)} left"
+            f"{self._touched()} touched, {_clock(took_s)} robot time{left}"
         )
         if self._live is None:
             if known / total >= self._told_share + _LINE_SHARE or known == total:
@@ -87,6 +88,19 @@ class LiveMap:
         elif time.monotonic() - self._drawn_s > _REDRAW_S:
             self._drawn_s = time.monotonic()
             self._live.update(self._map().append(f"\n{line}"), refresh=True)
+
+    def _left_s(self, data: Mapping[str, Any], time_us: int) -> float | None:
+        """Robot time left at this run's pace; None: of one place there is no pace yet.
+
+        The way to its first place, maybe across the whole area, is no place's.
+        """
+        if self._first is None:
+            self._first = (time_us, data["known"])
+        first_us, before = self._first
+        if data["known"] == before:
+            return None
+        pace_s = (time_us - first_us) / 1e6 / (data["known"] - before)
+        return float(pace_s * (data["total"] - data["known"]))
 
     def _touched(self) -> int:
         return sum(place.mark in TOUCHED for place in self._places.values())

@@ -139,10 +139,12 @@ def _scene(config: Config, path: Path) -> TableScene:
         raise InputError(
             f"The scene {path} isn't valid TOML: {error}.", "Correct that line."
         ) from None
-    if "table_z_mm" not in data:
-        data["table_z_mm"] = table_scene(config).table_z_mm
     try:
-        found = of_description(data)
+        # Where the table is doesn't matter to what stands on it: without it, it lies as it would
+        # under this object.
+        found = of_description({"table_z_mm": 0.0, **data})
+        if "table_z_mm" not in data:
+            found = table_scene(config, found.object)
     except InputError as error:
         raise InputError(f"{path}: {error.problem}", error.remedy) from error
     if unknown := set(data) - {"table_z_mm", "object"}:

@@ -14,24 +14,19 @@ from setae.report.trial import Trial, origin_note
 def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
     """Show how far down each trial went, beside the paper's."""
     with style.used():
-        figure = style.figure(9.0, 1.6 + 0.72 * len(trials))
-        axes = figure.add_axes((0.22, 0.17, 0.745, 0.62))
-        figure.text(
-            0.02, 0.935, "How deep it went before it stopped", fontsize=17, weight="bold",
-            va="center",
+        height = 2.1 + 0.62 * len(trials)
+        figure = style.figure(9.0, height)
+        top = style.headline(
+            figure, "How deep it went before it stopped",
+            f"This run ({origin_note(trials)}) beside the paper's experiment.",
         )  # fmt: skip
-        figure.text(
-            0.02, 0.86, f"This run ({origin_note(trials)}) beside the paper's experiment.",
-            fontsize=10.5, color=palette.MUTED, va="center",
-        )  # fmt: skip
+        bottom = 0.65 / height
+        axes = figure.add_axes((0.22, bottom, 0.745, top - 0.4 / height - bottom))
         trials_axes(axes, trials)
         figure.legend(
-            handles=trials_handles(),
-            loc="upper right",
-            bbox_to_anchor=(0.985, 0.985),
-            frameon=False,
-            fontsize=9.5,
-        )
+            handles=trials_handles(), loc="upper right", bbox_to_anchor=(0.985, top), ncols=3,
+            frameon=False, fontsize=9.5,
+        )  # fmt: skip
         style.save(figure, path)
 
 
