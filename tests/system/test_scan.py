@@ -158,6 +158,19 @@ def test_the_adaptive_scan_finds_where_an_object_ends_between_its_rows() -> None
     assert heights_mm[4, 2] == pytest.approx(top_mm, abs=HEIGHT_ERROR_MM)
 
 
+def test_the_adaptive_scan_finds_where_a_narrow_object_ends_between_its_rows() -> None:
+    # Seen in one row only, and at one place there, its end in the next row was taken for nothing.
+    config = coarse(7, coarse_mm=60.0)
+    top_mm = -100.0
+    strip = Box(centre_mm=(60.0, 70.0, top_mm - 15.0), edges_mm=(14.0, 34.0, 30.0), yaw_rad=0.0)
+    with rig.open("sim://", config=config, scene=Blocks((strip,))) as opened:
+        opened.robot.enable()
+        result = scan(opened.robot, opened.stage, mode="adaptive")
+    heights_mm = result.height_map.height_mm
+    assert heights_mm[3:5, 3] == pytest.approx(top_mm, abs=HEIGHT_ERROR_MM)
+    assert np.isfinite(heights_mm).sum() == 2
+
+
 def test_nothing_is_found_on_an_empty_table() -> None:
     for mode in MODES:
         config = coarse(3)

@@ -19,6 +19,12 @@ from setae.experiments.scan.survey import Cell, Survey
 
 # Columns per row of the lines along which rows are compared.
 _SLOPES = (-1, 0, 1)
+_IN_ROW_MM = 0.02
+# Lengths that differ by less are not tried one after the other.
+_LONGER_MM = 1.0
+# So many clearances are extended slowly at most: beyond, it takes less time to extend fast, and
+# to measure anew what was touched.
+_SLOWLY = 6.5
 
 
 def adaptive(steps: Steps, survey: Survey, settings: Scan, found: Found) -> None:
@@ -59,6 +65,7 @@ class _Tracer:
         self._settings = settings
         self._found = found
         self._rows_between = _spacing(settings)
+        self._free_mm = 0.0
 
     # ------------------------------------------------------------------------- a row
 
@@ -83,28 +90,37 @@ class _Tracer:
             run += 1
         passed = 0
         around_mm = self._heights_around(left[0], left[run - 1], row, self._rows_between)
-        for end in (0, run - 1):
+        ends = [run - 1] if self._leads_on(left[:run], row) else [0, run - 1]
+        for end in ends:
             touched = self._steps.go(
                 self._survey.x_mm(left[end]),
                 self._survey.y_mm(row),
                 retract_to_mm=self._length_over(max(around_mm, default=math.nan)),
             )
-            passed = self._passed(left[:end]) if touched else end + 1
             if touched:
+                passed = self._passed(left[:run]) if end > 0 else 0
                 break
+            passed = end + 1
         for column in left[:passed]:
             self._found((column, row), NOTHING)
         left = left[passed:]
         return self._touch(left, row, beside=True) if touched else left
 
+    def _leads_on(self, run: Sequence[int], row: int) -> bool:
+        """Whether the arm stands in a row, before a run of its places."""
+        x_mm, y_mm, _ = self._steps.position_mm
+        begin_mm, end_mm = self._survey.x_mm(run[0]), self._survey.x_mm(run[-1])
+        in_row = abs(y_mm - self._survey.y_mm(row)) < _IN_ROW_MM
+        return in_row and (begin_mm - x_mm) * (end_mm - begin_mm) >= 0
+
     def _passed(self, run: Sequence[int]) -> int:
-        """How many places of a row the arm left well behind before it was stopped."""
-        if not run:
-            return 0
+        """How many places of a run the arm left well behind before it was stopped, of the last."""
         here_mm = self._steps.position_mm[0]
-        begin_mm = self._survey.x_mm(run[0])
-        way_mm = abs(here_mm - begin_mm) - self._settings.clearance_mm
-        return sum(abs(self._survey.x_mm(column) - begin_mm) < way_mm for column in run)
+        forward = math.copysign(1.0, run[-1] - run[0])
+        return sum(
+            forward * (here_mm - self._survey.x_mm(column)) > self._settings.clearance_mm
+            for column in run[:-1]
+        )
 
     def _touch(self, left: list[int], row: int, *, beside: bool = False) -> list[int]:
         """Feel at the next place, or where it may be so, at the next but one; what is left."""
@@ -150,38 +166,57 @@ class _Tracer:
     def _visit(self, cell: Cell) -> Feeling:
         """Go there no lower than is safe, and feel."""
         steps = self._steps
-        place_mm = self._survey.x_mm(cell[0]), self._survey.y_mm(cell[1])
+        clearance_mm = self._settings.clearance_mm
         around_mm = self._heights_around(cell[0], cell[0], cell[1], 1)
-        top_mm = max([*around_mm, self._top_mm(cell)], key=_nan_low)
-        steps.retract(min(self._length_over(top_mm), steps.length_mm))
-        usual_mm = 2 * self._settings.clearance_mm
-        near_mm = usual_mm + top_mm - min(around_mm) if around_mm else usual_mm
-        hasty = self._nothing_beside(cell)
+        hasty = not around_mm or self._nothing_beside(cell)
         feeling = None
-        if not (steps.extended or math.isnan(top_mm)):
-            feeling = steps.go_and_feel(*place_mm, near_mm=0.0 if hasty else near_mm)
-            if feeling is None and not steps.short:
-                # Higher than what is known around it: once more, from farther up.
-                hasty = True
-                steps.retract(max(steps.short_mm, steps.length_mm - 1.5 * usual_mm))
-                feeling = steps.go_and_feel(*place_mm, near_mm=0.0)
+        for length_mm in self._lengths(cell, around_mm):
+            if length_mm > steps.length_mm:
+                steps.lower(min(length_mm, self._free_mm))
+            else:
+                steps.retract(length_mm)
+            # As far below the lowest around as the tip is above the highest.
+            near_mm = self._length_over(min(around_mm, default=math.nan)) - steps.length_mm
+            near_mm += 2 * clearance_mm
+            hasty = hasty or near_mm > _SLOWLY * clearance_mm
+            feeling = steps.go_and_feel(
+                self._survey.x_mm(cell[0]),
+                self._survey.y_mm(cell[1]),
+                near_mm=0.0 if hasty else near_mm,
+            )
+            self._free_mm = 0.0
+            if feeling is not None:
+                break
+            hasty = True  # higher than what is known around it: once more, from farther up
         if feeling is None:
-            hasty = True
-            steps.retract()
-            feeling = steps.go_and_feel(*place_mm, near_mm=0.0)
-            if feeling is None:
-                raise steps.too_high()
+            raise steps.too_high()
         if hasty and feeling.contact is not None:
             # Touched in haste: measure it.
             steps.lower(steps.length_over_mm(feeling.height_mm))
-            feeling = steps.feel(near_mm=1.5 * usual_mm) or feel_short(steps)
+            feeling = steps.feel(near_mm=2 * clearance_mm) or feel_short(steps)
         if feeling.mark == "double":
             # In touch at once: from farther up it is seen whether it is so.
-            steps.retract()
-            feeling = feel_short(steps)
+            steps.retract(max(steps.short_mm, steps.length_mm - 2 * clearance_mm))
+            feeling = steps.feel(near_mm=4 * clearance_mm) or feel_short(steps)
         if feeling.contact is not None:
-            steps.lower(steps.length_over_mm(feeling.height_mm))
+            self._free_mm = steps.length_over_mm(feeling.height_mm)
         return feeling
+
+    def _lengths(self, cell: Cell, around_mm: Sequence[float]) -> list[float]:
+        """Lengths to go to a place with, until nothing is in the way: from the longest on.
+
+        Over what is known beside the place and on the way; over what is known around; the least.
+        """
+        top_mm = max([*around_mm, self._top_mm(cell)], key=_nan_low)
+        reach = self._rows_between
+        column, row = cell
+        farther_mm = self._heights_around(column - reach + 1, column + reach - 1, row, reach)
+        lengths_mm = [self._steps.short_mm]
+        for height_mm in (max([top_mm, *farther_mm], key=_nan_low), top_mm):
+            length_mm = self._length_over(height_mm)
+            if lengths_mm[-1] + _LONGER_MM < length_mm < self._steps.long_mm - _LONGER_MM:
+                lengths_mm.append(length_mm)
+        return lengths_mm[::-1]
 
     def _length_over(self, top_mm: float) -> float:
         """Longest spring that clears a surface; the shortest where none is known."""
@@ -262,10 +297,20 @@ class _Tracer:
                     return None  # something, and nobody knows how high
         if not votes_mm or not all(self._flat(votes_mm[0], vote_mm) for vote_mm in votes_mm):
             return None
-        # Inside of an object in one row and outside in the other: it may end at the place.
-        if math.isnan(votes_mm[0]) and self._inside(column, below) != self._inside(column, above):
+        if math.isnan(votes_mm[0]) and self._may_end(cell, below, above):
             return None
         return votes_mm[len(votes_mm) // 2]
+
+    def _may_end(self, cell: Cell, below: int, above: int) -> bool:
+        """Whether an object may end at a place that lies between places where nothing is.
+
+        Right beside it something is; or one row is inside of an object, and the other outside.
+        """
+        column, row = cell
+        beside = [(column, other) for other in (below, above) if abs(other - row) == 1]
+        if any(math.isfinite(self._survey.height_mm(cell)) for cell in beside):
+            return True
+        return self._inside(column, below) != self._inside(column, above)
 
     def _inside(self, column: int, row: int) -> bool:
         """Whether something is known to stand near to both sides of a place in its row."""
