@@ -99,6 +99,7 @@ class Fake:
     braking: bool = False
     remote: bool = True
     mute: bool = False
+    deaf: bool = False
     robot_mode: int = 7
     safety_mode: int = 1
     playing: bool = False
@@ -116,6 +117,8 @@ class Fake:
             self.remote = False
         elif word == "mute":
             self.mute = True
+        elif word == "deaf":
+            self.deaf = True
         elif word == "safety":
             self.safety_mode = int(rest)
             self.playing = self.playing and self.safety_mode in (1, 2)
@@ -198,6 +201,8 @@ class Fake:
     def _converse(self) -> None:
         """The control script's side of the registers."""
         command = self.inputs.get("input_int_register_0", 0)
+        if self.deaf:
+            return
         if command == 0:
             self.done = False
             return

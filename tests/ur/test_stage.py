@@ -295,6 +295,19 @@ def test_a_box_that_was_never_set_is_told(fake: FakeController) -> None:
         pass
 
 
+def test_a_controller_that_takes_no_move_but_tells_its_state_is_noticed(
+    fake: FakeController,
+) -> None:
+    # Without its deadline a move that nobody carries out would have been waited for until the
+    # experiment's own, and no test would have noticed.
+    with connected(fake, command_deadline_s=1.0) as stage:
+        fake.tell("deaf")
+        stage.move_to((0, 0, -80))
+        with pytest.raises(ArmFrozenError, match="did not take a move within 1 s"):
+            poll_until(stage, lambda: False)
+        assert stage.position_mm == pytest.approx((0, 0, 0), abs=1e-6)
+
+
 def test_a_dead_controller_is_noticed(fake: FakeController) -> None:
     with connected(fake) as stage:
         stage.move_to((0, 0, -80))
@@ -356,6 +369,8 @@ def test_a_pause_of_the_host_at_rest_costs_nothing(fake: FakeController) -> None
         stage.move_to((0, 0, -5))
         poll_until(stage, lambda: not stage.moving)
         assert stage.position_mm == pytest.approx((0, 0, -5), abs=NEAR_MM)
+        # A new program without its watchdog would have passed.
+        assert fake.told()["watchdog_hz"] == 5.0
 
 
 @pytest.mark.parametrize("position_mm", [(1, 2), (0, 0, math.nan)])
