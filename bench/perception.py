@@ -104,7 +104,7 @@ def objects() -> Iterable[Figure]:
         "objects_silhouette_paper",
         round(found.silhouette_paper, 3),
         "1",
-        "of the paper's normalised data: aligned by the least x and y, 20 x 15, flattened",
+        "of the heights, normalised as in the paper: aligned by the least x and y, 20 x 15, flat",
     )
     yield Figure(
         "objects_silhouette_tsne",

@@ -83,6 +83,13 @@ class HeightMap:
                 f"There are {', '.join(MARKS)}.",
             )
 
+    def same_as(self, other: HeightMap) -> bool:
+        """Whether both say exactly the same of the same places."""
+        return all(
+            np.array_equal(getattr(self, name), getattr(other, name), equal_nan=name != "mark")
+            for name in ("x_mm", "y_mm", "height_mm", "mark")
+        )
+
     def points_mm(self) -> NDArray[np.float64]:
         """Points that were touched, in the world, (N, 3); what was only inferred isn't among them.
 

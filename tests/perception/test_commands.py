@@ -75,6 +75,13 @@ def test_unknown_has_no_confidence(given: list[str], tmp_path: Path) -> None:
     assert ">unknown</span></td><td>–</td>" in (tmp_path / "report.html").read_text()
 
 
+def test_a_scan_given_twice_counts_once(given: list[str]) -> None:
+    # It vouched for itself: the folder of a study, given twice, made every scan known.
+    found = compare(samples.read_all([*given, given[0]]))
+    assert len(found.labels) == len(given)
+    assert "It is the same as lidded_container-110." in found.left_out[0]
+
+
 def test_scans_without_a_shape_are_left_out_by_name(
     given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

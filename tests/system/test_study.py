@@ -91,6 +91,8 @@ def test_a_table_has_a_line_for_each_run(tmp_path: Path) -> None:
     assert read[0]["robot_s"] == rows[0]["robot_s"]
     assert read[1]["robot_s"] is None
     assert json.loads(read[0]["scan.area_mm"]) == [20, 20]
+    with pytest.raises(InputError, match=r"is a folder. Give the table in it: table\.parquet"):
+        study.read_table(tmp_path)
 
 
 def test_processes_share_the_runs_and_give_what_one_gives(tmp_path: Path) -> None:

@@ -55,4 +55,4 @@ def show_arm_targets(
 
 
 def _row(point_mm: Sequence[float]) -> str:
-    return ", ".join(f"{value_mm:.1f}" for value_mm in point_mm)
+    return ", ".join(f"{value_mm:z.1f}" for value_mm in point_mm)

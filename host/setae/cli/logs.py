@@ -52,7 +52,11 @@ def _logs_of(given: Path) -> list[record.Log]:
         except LogError as error:
             print(f"setae: Left out: {error.problem}", file=sys.stderr)
     if not logs:
-        raise LogError(f"{given} holds no log.", "Give the folder that an experiment wrote.")
+        raise LogError(
+            f"{given} holds no log.",
+            "Give the folder that an experiment wrote. Of a study or a comparison, the same "
+            "`setae study` or `setae cluster` writes the report again.",
+        )
     return logs
 
 

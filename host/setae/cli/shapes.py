@@ -181,6 +181,6 @@ def _print_comparison(found: shapes.Comparison) -> None:
     console.print(table)
     say(
         f"Named right {found.accuracy:.0%}, unknown if never met {found.unknown:.0%}. Silhouette "
-        f"{found.silhouette:.2f} of the descriptions, {found.silhouette_paper:.2f} of the paper's "
-        f"data, {found.silhouette_plane:.2f} of their t-SNE."
+        f"{found.silhouette:.2f} of the descriptions, {found.silhouette_paper:.2f} of the "
+        f"heights as the paper aligns them, {found.silhouette_plane:.2f} of their t-SNE."
     )

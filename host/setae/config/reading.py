@@ -124,7 +124,7 @@ def replaced(config: Config, changes: Mapping[str, Any]) -> Config:
         if not key:
             raise ConfigError(f"{name!r} is no key.", "Give section and key: scan.step_mm.")
         document.setdefault(section, {})[key] = value
-    return _config(_parse_document(document, "change"), {}, "change")
+    return _config(_parse_document(document, "configuration"), {}, "configuration")
 
 
 def _parse(text: str, source: str) -> dict[str, dict[str, Any]]:

@@ -89,7 +89,7 @@ class Comparison:
 
     @property
     def silhouette_plane(self) -> float:
-        """Of the paper's data in the plane of t-SNE."""
+        """Of the heights, normalised as in the paper, in the plane of t-SNE."""
         return paper.silhouette(self.plane, self.labels)
 
 
@@ -103,11 +103,13 @@ def compare(samples: Sequence[Sample]) -> Comparison:
     """
     # The paper's objects in its order, then all others.
     order = {shape: number for number, shape in enumerate(SHAPES)}
-    kept, vectors, data, left_out = [], [], [], []
+    kept: list[Sample] = []
+    vectors, data, left_out = [], [], []
     for sample in sorted(
         samples, key=lambda one: (order.get(str(one.label), len(order)), str(one.label))
     ):
         try:
+            _require_new(sample, kept)
             described = _described(sample)
             normalised = paper.normalised(sample.heights, reach_mm=sample.reach_mm)
         except InputError as error:
@@ -139,6 +141,13 @@ def compare(samples: Sequence[Sample]) -> Comparison:
         ),
         model=classifier.train(np.stack(vectors), labels),
     )
+
+
+def _require_new(sample: Sample, kept: Sequence[Sample]) -> None:
+    """Raise InputError where a scan is there already: it would vouch for its twin."""
+    for other in kept:
+        if sample.heights.same_as(other.heights):
+            raise InputError(f"It is the same as {other.name}.", "Every scan counts once.")
 
 
 def _described(sample: Sample) -> FloatArray:

@@ -220,7 +220,10 @@ def _measures(found: Comparison) -> str:
         ("named right, of all scans, each by a model of the others", f"{found.accuracy:.0%}"),
         ("unknown to a model without their shape", f"{found.unknown:.0%}"),
         ("silhouette of the descriptions, in units of expected spread", f"{found.silhouette:.2f}"),
-        ("silhouette of the paper’s 20 × 15 data", f"{found.silhouette_paper:.2f}"),
+        (
+            "silhouette of the 20 × 15 heights, aligned as in the paper",
+            f"{found.silhouette_paper:.2f}",
+        ),
         ("silhouette of these in the plane of t-SNE", f"{found.silhouette_plane:.2f}"),
     ]
     near = [one for one in found.nearness if one is not None]

@@ -70,6 +70,8 @@ def read_table(path: Path) -> list[dict[str, Any]]:
         PyArrow isn't installed.
     """
     parquet = extras.load("pyarrow.parquet", "study", "The table")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder.", "Give the table in it: table.parquet.")
     try:
         rows: list[dict[str, Any]] = parquet.read_table(path).to_pylist()
     except (OSError, ValueError) as error:
