@@ -16,7 +16,7 @@ from setae.cli import live_map, main
 from setae.errors import LogError
 from setae.experiments.events import Event
 from setae.experiments.scan import read, read_parts, scans_of
-from setae.report import scan_page, scan_pictures, style
+from setae.report import scan_notes, scan_page, scan_pictures, style
 from setae.robot import Robot
 
 
@@ -139,6 +139,16 @@ def test_scans_of_two_runs_in_a_folder_go_on_each_with_its_own_settings(
     assert read_parts([first, later]).complete
     assert record.read(out / "adaptive-2.mcap").metadata["seed"] == 3
     capsys.readouterr()
+    # Their report named the orange for both, compared their times, and was alike to "nan%".
+    scans = report.scan.scans(out)
+    assert scan_notes.note(scans) == (
+        "Orange, size 0.85 (paper) and an empty table (adaptive); simulated, plant ideal, seed 0 "
+        "(paper) and simulated, plant ideal, seed 3 (adaptive)."
+    )
+    finding = scan_page.finding(scans)
+    assert "the scans differ in: object, seed, places." in finding
+    assert "of the time of the paper" not in finding
+    assert "nan" not in scan_page._table(scans)
 
 
 def test_a_mode_that_two_runs_asked_for_with_other_settings_is_refused(

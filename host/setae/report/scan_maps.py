@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from setae.report import extras, palette, style
-from setae.report.scan_reading import Scan, object_note, origin_note
+from setae.report.scan_notes import note
+from setae.report.scan_reading import Scan
 
 __all__ = ["MODES", "heights_picture", "square", "title", "top_mm"]
 
@@ -26,14 +27,13 @@ def heights_picture(path: Path, scans: Sequence[Scan]) -> None:
     rows = len(scans)
     with style.used():
         figure = style.figure(max(4.7 * columns, 6.0), 3.75 * rows + 1.5)
-        what = ", ".join(text for text in (object_note(scans), origin_note(scans)) if text)
-        note = f"{what[:1].upper()}{what[1:]}."
+        about = note(scans)
         if columns > 1:
-            note += (
+            about += (
                 " The errors' colours show every place with a height; the number leaves out those "
                 "with a dot: at an edge, or where nothing is in reach."
             )
-        top = style.headline(figure, "Height maps from above", note)
+        top = style.headline(figure, "Height maps from above", about)
         bottom = (0.35 if columns > 1 else 0.6) / figure.get_figheight()
         style.arrange(figure, bottom=bottom, top=top)
         axes = figure.subplots(rows, columns, squeeze=False)

@@ -13,6 +13,7 @@ from setae.experiments.scan.quality import Quality, agreement
 from setae.heightmap import TOUCHED
 from setae.report import extras, palette, solving, template
 from setae.report.scan_maps import top_mm
+from setae.report.scan_notes import comparable, differences, each, object_of, plant_of
 from setae.report.scan_pictures import cloud
 from setae.report.scan_reading import Scan
 from setae.wording import counted
@@ -27,6 +28,7 @@ _SIMULATED: Final = (
     "simulated: the board’s own firmware, compiled for this computer, drives a physical model of "
     "servos, tendons, spring and bristle. No hardware was involved."
 )
+_REAL: Final = "the real one"
 _SAID: Final = {
     "paper": "the paper’s cycle",
     "safe": "retracted in every step",
@@ -44,18 +46,17 @@ def page(scans: Sequence[Scan], pictures: Sequence[Path]) -> str:
     """
     plotly = extras.load("plotly.offline")
     by_name = {path.stem: path for path in pictures}
-    settings = scans[0].config.scan
     return template.fill(
         "scan.html",
         {
             "badges": _badges(scans),
-            "step": f"{settings.step_mm:g} mm",
-            "threshold": f"{scans[0].config.bristle.threshold_hpa:g} hPa",
+            "step": each(scans, lambda scan: f"{scan.config.scan.step_mm:g} mm"),
+            "threshold": each(scans, lambda scan: f"{scan.config.bristle.threshold_hpa:g} hPa"),
             "finding": html.escape(finding(scans)),
             "table": _table(scans),
-            "depth": f"{settings.contact_depth_mm:g} mm",
+            "depth": each(scans, lambda scan: f"{scan.config.scan.contact_depth_mm:g} mm"),
             "origin": _origin(scans),
-            "config": template.config_text(scans[0].logs[0].metadata),
+            "config": _configs(scans),
             "plotly": plotly.get_plotlyjs(),
             "data": template.json_text(_data(scans)),
             "js": template.text("scan.js"),
@@ -77,18 +78,22 @@ def finding(scans: Sequence[Scan]) -> str:
         if not scan.result.complete:
             text += ", not complete"
         sentences.append(f"{text[:1].upper()}{text[1:]}.")
-    times_s = {scan.result.mode: scan.result.duration_s for scan in scans if scan.result.complete}
-    if times_s.get("paper") and "adaptive" in times_s:
-        share = times_s["adaptive"] / times_s["paper"]
+    whole = {scan.result.mode: scan for scan in scans if scan.result.complete}
+    if "paper" in whole and "adaptive" in whole and comparable(whole["paper"], whole["adaptive"]):
+        share = whole["adaptive"].result.duration_s / whole["paper"].result.duration_s
         sentences.append(f"The adaptive scan took {share:.0%} of the time of the paper’s cycle.")
+    if other := differences(scans):
+        sentences.append(f"Besides their mode the scans differ in: {', '.join(other)}.")
     return " ".join(sentences)
 
 
 def _badges(scans: Sequence[Scan]) -> str:
-    if scans[0].logs[0].simulated:
-        badges = '<span class="badge">Simulated: no hardware</span>'
-    else:
-        badges = '<span class="badge real">Measured on the robot</span>'
+    simulated = {scan.logs[0].simulated for scan in scans}
+    badges = ""
+    if True in simulated:
+        badges += '<span class="badge">Simulated: no hardware</span>'
+    if False in simulated:
+        badges += '<span class="badge real">Measured on the robot</span>'
     if any(not scan.result.complete or log.damage for scan in scans for log in scan.logs):
         badges += '<span class="badge warn">Not all scans are complete; see below</span>'
     return badges
@@ -122,7 +127,7 @@ def _table(scans: Sequence[Scan]) -> str:
         if truth:
             cells += _errors(scan.quality)
         if paper is not None and len(scans) > 1:
-            cells.append("–" if scan is paper else f"{_like(scan, paper):.1%}")
+            cells.append(_like(scan, paper))
         lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
     return "".join([*lines, "</tbody></table>"])
 
@@ -135,25 +140,27 @@ def _errors(found: Quality | None) -> tuple[str, str]:
     )
 
 
-def _like(scan: Scan, paper: Scan) -> float:
-    return agreement(scan.result.height_map, paper.result.height_map)
+def _like(scan: Scan, paper: Scan) -> str:
+    if scan is paper or not comparable(scan, paper):
+        return "–"
+    return f"{agreement(scan.result.height_map, paper.result.height_map):.1%}"
+
+
+def _configs(scans: Sequence[Scan]) -> str:
+    """Show the configuration of all scans, or where they differ that of each."""
+    metadata = {scan.result.mode: scan.logs[0].metadata for scan in scans}
+    if len({str(about.get("config")) for about in metadata.values()}) == 1:
+        return template.config_text(scans[0].logs[0].metadata)
+    return "".join(template.config_text(about, f"mode {mode}") for mode, about in metadata.items())
 
 
 def _origin(scans: Sequence[Scan]) -> str:
-    first = scans[0].logs[0]
-    rows: list[tuple[str, str]] = []
-    if first.simulated:
-        rows.append(("robot", _SIMULATED))
-        rows.append(("plant, seed", f"{first.metadata.get('plant')}, {first.metadata.get('seed')}"))
-    else:
-        rows.append(("robot", "the real one"))
-    what = scans[0].result.scene.get("object")
-    if isinstance(what, Mapping):
-        place = f"at {what['x_mm']:g}, {what['y_mm']:g} mm, turned by {what['yaw_deg']:g}°"
-        rows.append(("object", f"{what['shape']}, size {what['scale']:g}, {place}"))
-    versions = first.metadata.get("versions") or {}
-    if isinstance(versions, Mapping) and versions:
-        rows.append(("versions", ", ".join(f"{name} {v}" for name, v in sorted(versions.items()))))
+    rows = [("robot", each(scans, lambda scan: _SIMULATED if scan.logs[0].simulated else _REAL))]
+    if any(scan.logs[0].simulated for scan in scans):
+        rows.append(("plant, seed", each(scans, plant_of)))
+        rows.append(("object", each(scans, object_of)))
+    if versions := each(scans, _versions):
+        rows.append(("versions", versions))
     rows += solving.row(log for scan in scans for log in scan.logs)
     rows.append(("logs", ", ".join(log.path.name for scan in scans for log in scan.logs)))
     for scan in scans:
@@ -162,6 +169,13 @@ def _origin(scans: Sequence[Scan]) -> str:
         rows += [(log.path.name, str(log.damage)) for log in scan.logs if log.damage]
     items = "".join(f"<dt>{html.escape(a)}</dt><dd>{html.escape(b)}</dd>" for a, b in rows)
     return f"<dl>{items}</dl>"
+
+
+def _versions(scan: Scan) -> str:
+    versions = scan.logs[0].metadata.get("versions")
+    if not isinstance(versions, Mapping):
+        return ""
+    return ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
 
 
 def _data(scans: Sequence[Scan]) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from setae.heightmap import TOUCHED
 from setae.report import extras, palette, style
 from setae.report.scan_maps import MODES, heights_picture, square, title, top_mm
-from setae.report.scan_reading import Scan, object_note, origin_note
+from setae.report.scan_notes import each, note
+from setae.report.scan_reading import Scan
 
 __all__ = ["cloud", "overview_picture", "write_all"]
 
@@ -34,12 +35,6 @@ def write_all(folder: Path, scans: Sequence[Scan]) -> tuple[Path, ...]:
     return tuple(folder / f"{name}.png" for name in pictures)
 
 
-def _note(scans: Sequence[Scan], *more: str) -> str:
-    """Where it is from, and what else is to be known, as sentences."""
-    what = ", ".join(text for text in (object_note(scans), origin_note(scans)) if text)
-    return " ".join(f"{text[:1].upper()}{text[1:]}." for text in (what, *more))
-
-
 # ------------------------------------------------------------------------------ clouds
 
 
@@ -48,8 +43,8 @@ def clouds_picture(path: Path, scans: Sequence[Scan]) -> None:
     extras.load("mpl_toolkits.mplot3d")
     with style.used():
         figure = style.figure(6.0 * len(scans) + 1.2, 5.6)
-        note = _note(scans, "small points were not visited: the places around leave no doubt")
-        style.headline(figure, "Points that the bristle felt", note)
+        points = "Small points were not visited: the places around leave no doubt."
+        style.headline(figure, "Points that the bristle felt", f"{note(scans)} {points}")
         width = 6.0 / figure.get_figwidth()
         for index, scan in enumerate(scans):
             axes = figure.add_axes((index * width, 0.0, width, 0.84), projection="3d")
@@ -64,8 +59,8 @@ def overview_picture(path: Path, scans: Sequence[Scan]) -> None:
     extras.load("mpl_toolkits.mplot3d")
     with style.used():
         figure = style.figure(13.2, 5.2)
-        points = "small points: not visited, the places around leave no doubt"
-        style.headline(figure, "The same object felt in two modes", _note(scans, points))
+        points = "Small points: not visited, the places around leave no doubt."
+        style.headline(figure, "The same object felt in two modes", f"{note(scans)} {points}")
         for index, scan in enumerate(scans[:2]):
             axes = figure.add_axes((0.36 * index, -0.03, 0.36, 0.92), projection="3d")
             cloud_axes(axes, scan, scans)
@@ -129,7 +124,9 @@ def _height_bar(figure: Any, left: float, scans: Sequence[Scan]) -> None:
     scale = extras.load("matplotlib.cm").ScalarMappable(cmap=style.colours(palette.HEIGHTS))
     scale.set_clim(low_mm, high_mm)
     axes = figure.add_axes((left, 0.2, 0.16 / figure.get_figwidth(), 0.5))
-    figure.colorbar(scale, cax=axes).set_label(f"height {scans[0].above} (mm)")
+    figure.colorbar(scale, cax=axes).set_label(
+        f"height {each(scans, lambda scan: scan.above)} (mm)"
+    )
 
 
 def _box(scans: Sequence[Scan]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -165,7 +162,7 @@ def paths_picture(path: Path, scans: Sequence[Scan]) -> None:
     collections = extras.load("matplotlib.collections")
     with style.used():
         figure = style.figure(6.4 * len(scans), 6.0)
-        top = style.headline(figure, "The arm's way from above", _note(scans))
+        top = style.headline(figure, "The arm's way from above", note(scans))
         style.arrange(figure, bottom=0.36 / figure.get_figheight(), top=top)
         for axes, scan in zip(figure.subplots(1, len(scans), squeeze=False)[0], scans, strict=True):
             way = scan.path.value[:, :2]
@@ -197,7 +194,7 @@ def pressure_picture(path: Path, scans: Sequence[Scan]) -> None:
     """The pressure over the whole scan, and around its first touch."""
     with style.used():
         figure = style.figure(12.4, 2.8 * len(scans) + 1.7)
-        top = style.headline(figure, "What the bristle felt", _note(scans))
+        top = style.headline(figure, "What the bristle felt", note(scans))
         style.arrange(figure, bottom=0.36 / figure.get_figheight(), top=top)
         axes = figure.subplots(
             len(scans), 2, squeeze=False, gridspec_kw={"width_ratios": [1.7, 1.0]}

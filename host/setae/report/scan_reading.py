@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from setae.experiments.scan import ScanResult, read_parts, scans_of
 from setae.experiments.scan.quality import Quality, Surface, quality, surface_of
 from setae.record import Log
 
-__all__ = ["Scan", "Trace", "object_note", "origin_note", "read_scans"]
+__all__ = ["Scan", "Trace", "read_scans"]
 
 _ORDER = ("paper", "safe", "adaptive")
 
@@ -96,24 +96,6 @@ def read_scans(logs: Iterable[Log]) -> tuple[Scan, ...]:
     """
     scans = [_scan(parts) for parts in scans_of(logs)]
     return tuple(sorted(scans, key=lambda scan: _ORDER.index(scan.result.mode)))
-
-
-def object_note(scans: Sequence[Scan]) -> str:
-    """What was scanned, as far as it is known: simulated objects are."""
-    what = scans[0].result.scene.get("object")
-    if not isinstance(what, Mapping):
-        return ""
-    return f"{str(what['shape']).replace('_', ' ')}, size {what['scale']:.2g}"
-
-
-def origin_note(scans: Sequence[Scan]) -> str:
-    """Where the data is from, for a picture's corner."""
-    first = scans[0].logs[0]
-    if not first.simulated:
-        return "measured on the robot"
-    return f"simulated, plant {first.metadata.get('plant') or 'ideal'}, seed " + str(
-        first.metadata.get("seed")
-    )
 
 
 def _scan(parts: Sequence[Log]) -> Scan:

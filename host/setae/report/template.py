@@ -38,13 +38,13 @@ def json_text(data: Any) -> str:
     return json.dumps(_clean(data), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
 
 
-def config_text(metadata: Mapping[str, Any]) -> str:
+def config_text(metadata: Mapping[str, Any], of: str = "the run") -> str:
     """Show the configuration of a run, folded; nothing where its log has none."""
     config = metadata.get("config")
     if not config:
         return ""
     return (
-        "<details><summary>Configuration of the run</summary>"
+        f"<details><summary>Configuration of {html.escape(of)}</summary>"
         f"<pre>{html.escape(str(config))}</pre></details>"
     )
 
