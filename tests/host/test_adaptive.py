@@ -44,7 +44,7 @@ class Walker:
         self.ground_mm = ground_mm
         self.position_mm = (0.0, 0.0, 0.0)
         self.length_mm = LONG_MM
-        self.short_mm = SHORT_MM
+        self.short_mm, self.long_mm = SHORT_MM, LONG_MM
 
     @property
     def extended(self) -> bool:
@@ -163,18 +163,18 @@ def total(walks: list[Walk], of: Callable[[Walk], npt.NDArray[np.bool_]]) -> int
 
 def test_half_of_the_places_are_not_visited_and_few_of_them_are_wrong(walks: list[Walk]) -> None:
     # Nothing would have noticed inferred heights that were 20 mm off, nor a line of votes that
-    # ends on two surfaces. Measured: 3560 of 6615 places, 17 heights off, 28 wrongly empty or not.
+    # ends on two surfaces. Measured: 3437 of 6615 places, 15 heights off, 14 wrongly empty or not.
     places = total(walks, lambda walk: walk.inferred)
     assert places > 0.5 * len(walks) * walks[0].inferred.size
-    assert total(walks, lambda walk: walk.inferred & (walk.error_mm > 1.5)) <= 20
-    assert total(walks, lambda walk: walk.inferred & walk.wrong) <= 30
+    assert total(walks, lambda walk: walk.inferred & (walk.error_mm > 1.5)) <= 16
+    assert total(walks, lambda walk: walk.inferred & walk.wrong) <= 15
 
 
 def test_what_is_visited_is_found_and_measured_slowly(walks: list[Walk]) -> None:
-    # Nothing would have noticed that a height touched in haste was kept (274 of 753), or that of
+    # Nothing would have noticed that a height touched in haste was kept (274 of some 750), or that of
     # each contact from close above was said that it may have been there before.
     assert not total(walks, lambda walk: ~walk.inferred & (walk.grid.mark != "lost") & walk.wrong)
-    assert total(walks, lambda walk: ~walk.inferred & (walk.error_mm > 0.1)) <= 45
+    assert total(walks, lambda walk: ~walk.inferred & (walk.error_mm > 0.1)) <= 25
     assert not total(walks, lambda walk: walk.grid.mark == "double")
 
 
