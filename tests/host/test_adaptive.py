@@ -171,8 +171,8 @@ def test_half_of_the_places_are_not_visited_and_few_of_them_are_wrong(walks: lis
 
 
 def test_what_is_visited_is_found_and_measured_slowly(walks: list[Walk]) -> None:
-    # Nothing would have noticed that a height touched in haste was kept (274 of some 750), or that of
-    # each contact from close above was said that it may have been there before.
+    # Nothing would have noticed that a height touched in haste was kept (274 of some 750), or that
+    # of each contact from close above was said that it may have been there before.
     assert not total(walks, lambda walk: ~walk.inferred & (walk.grid.mark != "lost") & walk.wrong)
     assert total(walks, lambda walk: ~walk.inferred & (walk.error_mm > 0.1)) <= 25
     assert not total(walks, lambda walk: walk.grid.mark == "double")
