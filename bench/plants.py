@@ -85,8 +85,8 @@ def _why(row: Comparison) -> str:
     if aside.jerk:
         quietest = sorted(aside.shifts.each, key=lambda shift: shift.without_hpa)[:TOLD]
         parts = (f"{shift.without_hpa:.1f} without {shift.cause}" for shift in quietest)
-        return f"a jerk made {aside.shifts.loudest_hpa:.1f} hPa: {', '.join(parts)}"
-    whole_mm = aside.outwards_mm(aside.shifts.tip_mm - aside.shifts.ideal_mm)
+        return f"a jerk made {aside.shifts.here.loudest_hpa:.1f} hPa: {', '.join(parts)}"
+    whole_mm = aside.outwards_mm(aside.shifts.here.tip_mm - aside.shifts.ideal.tip_mm)
     parts = (
         f"{shift.cause} {aside.outwards_mm(shift.here_mm):+.1f}"
         for shift in aside.shifts.each[:TOLD]

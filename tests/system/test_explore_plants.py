@@ -77,7 +77,7 @@ def test_a_miss_is_laid_at_the_imperfection_that_did_it(tmp_path: Path) -> None:
     assert (offsets.cause, backlash.cause) == ("zero offsets", "backlash")
     # It did nearly all: without it the tip is where the ideal robot's is, and it alone
     # moves it as far.
-    whole_mm = aside.shifts.tip_mm - aside.shifts.ideal_mm
+    whole_mm = aside.shifts.here.tip_mm - aside.shifts.ideal.tip_mm
     assert np.linalg.norm(offsets.here_mm - whole_mm) < 0.15 * np.linalg.norm(whole_mm)
     assert np.linalg.norm(offsets.alone_mm - whole_mm) < 0.15 * np.linalg.norm(whole_mm)
     assert aside.outwards_mm(offsets.here_mm) < -5

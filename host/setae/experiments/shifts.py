@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from setae.errors import SetaeError
 from setae.rig import plants, replay
+from setae.rig.replay import Played
 
 __all__ = ["Shift", "Shifts", "find"]
 
@@ -35,7 +36,7 @@ class Shift:
         (3,) frame D: from where the robot ``ideal`` has its tip to where it has it
         with this alone.
     without_hpa
-        The loudest pressure by motion of the last half second, were it not there.
+        `setae.rig.replay.Played.loudest_hpa` of the robot without it.
     """
 
     cause: str
@@ -55,12 +56,8 @@ class Shifts:
 
     Attributes
     ----------
-    tip_mm
-        (3,) the undeformed bristle's tip in frame D.
-    ideal_mm
-        (3,) the same of the robot ``ideal``, under the same pulses.
-    loudest_hpa
-        The loudest pressure by motion of the last half second.
+    here, ideal
+        What the pulses led to on the robot itself, and on the robot ``ideal``.
     each
         What moves it furthest first.
     untold
@@ -68,9 +65,8 @@ class Shifts:
         finds no equilibrium.
     """
 
-    tip_mm: Floats
-    ideal_mm: Floats
-    loudest_hpa: float
+    here: Played
+    ideal: Played
     each: tuple[Shift, ...]
     untold: tuple[str, ...] = ()
 
@@ -129,9 +125,8 @@ def find(parameters: Mapping[str, float], seed: int, pulse_us: ArrayLike) -> Shi
         )
     each.sort(key=lambda shift: -shift.size_mm)
     return Shifts(
-        tip_mm=here.tip_mm,
-        ideal_mm=ideal.tip_mm,
-        loudest_hpa=here.loudest_hpa,
+        here=here,
+        ideal=ideal,
         each=tuple(each),
         untold=tuple(untold),
     )

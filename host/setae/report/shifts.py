@@ -84,7 +84,7 @@ def look(row: Comparison) -> Aside | None:
         )
     except SetaeError:
         return None
-    if math.dist(shifts.tip_mm, trial.log.array("/truth", "filament_mm")[index, 1]) > _SAME_MM:
+    if math.dist(shifts.here.tip_mm, trial.log.array("/truth", "filament_mm")[index, 1]) > _SAME_MM:
         return None
     return Aside(
         trial=trial,
@@ -160,11 +160,11 @@ def sentence(aside: Aside) -> str:
         parts = [f"{shift.without_hpa:.1f} hPa ({shift.cause})" for shift in each]
         mended = f" Were one imperfection mended, the same pulses would make {', '.join(parts)}."
         return (
-            f"{aside.when}: motion alone made {shifts.loudest_hpa:.1f} hPa, and"
+            f"{aside.when}: motion alone made {shifts.here.loudest_hpa:.1f} hPa, and"
             f" {aside.trial.threshold_hpa:g} count as a touch."
             f"{mended if parts else ''}{_untold(shifts)}"
         )
-    whole_mm = shifts.tip_mm - shifts.ideal_mm
+    whole_mm = shifts.here.tip_mm - shifts.ideal.tip_mm
     each = [shift for shift in shifts.each if shift.size_mm >= _TOLD_MM]
     parts = [_part(aside, shift) for shift in each]
     if len(each) < len(shifts.each):
