@@ -367,6 +367,18 @@ def test_the_table_holds_the_runs_of_all_calls_into_its_folder(
     page = (tmp_path / "report.html").read_text()
     assert "3 of 3 runs done" in page
     assert "adaptive, area_mm [20, 20], step_mm 10<" in page
+    # Of a run from before there was a column its cell is empty. `setae cluster` advised to run the
+    # study again, which did nothing.
+    line = tmp_path / study.RUNS / rows[1]["run"] / conducting.LINE
+    kept = json.loads(line.read_text())
+    line.write_text(
+        json.dumps({name: kept[name] for name in kept.keys() - {"robot_s", "reach_mm"}})
+    )
+    call("--vary", "scan.step_mm=20", "--vary", "scan.order='raster'", *out)
+    again = study.read_table(tmp_path / "table.parquet")
+    assert [row["robot_s"] is None for row in again] == [False, True, False]
+    with pytest.raises(InputError, match=r"has no 'reach_mm'\. Do the study again, into another"):
+        samples.read(tmp_path)
 
 
 def test_runs_of_two_robots_in_one_folder_are_told_apart(tmp_path: Path) -> None:

@@ -200,8 +200,10 @@ def _of_run(folder: Path) -> Sample:
         scene = TableScene(table_z_mm=float(row["table_z_mm"]), object=what)
         reach_mm = float(row["reach_mm"])
     except (KeyError, TypeError, ValueError, SetaeError) as error:
+        why = f"its line has no {error}" if isinstance(error, KeyError) else error
         raise InputError(
-            f"{folder} holds no run of this version: {error}.", "Run the study again."
+            f"{folder} holds no run of this version: {why}.",
+            "Do the study again, into another folder: what is done is kept in this one.",
         ) from error
     plant = row.get("simulator.plant_name") or "ideal"
     return Sample(
