@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import signal
 import sys
 from pathlib import Path
@@ -47,6 +48,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return LONG_FIRST.index(folder) if folder in LONG_FIRST else len(LONG_FIRST)
 
     items.sort(key=place)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say which tests need a library that this Python can't have."""
+    if importlib.util.find_spec("rtde_control") is None:
+        terminalreporter.write_line("Without tests/ur: ur-rtde isn't installed (see docs/ur.md).")
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
