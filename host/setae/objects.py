@@ -6,6 +6,7 @@ square, whose sides go along +x and +y.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import random
 from collections.abc import Callable, Mapping
@@ -33,6 +34,7 @@ SCALE_MIN, SCALE_MAX = 0.8, 1.2
 
 # Between the extended tip and the table.
 _TABLE_GAP_MM: Final = 3.0
+_TABLE_FAR_MM: Final = 5000.0  # longer than any configured robot
 _TABLE_EDGE_MM: Final = 5000.0  # below the largest area that may be scanned, and around it
 _TABLE_THICKNESS_MM: Final = 40.0
 
@@ -170,9 +172,8 @@ class ScanObject:
             raise InputError(
                 f"There is no object {self.shape!r}.", f"Give one of {', '.join(SHAPES)}."
             )
-        for name in ("x_mm", "y_mm", "yaw_deg"):
-            if not math.isfinite(getattr(self, name)):
-                raise InputError(f"object: {name} is {getattr(self, name)}.", "Give a number.")
+        for name in ("scale", "x_mm", "y_mm", "yaw_deg"):
+            _require_number(f"object: {name}", getattr(self, name))
         if not SCALE_MIN <= self.scale <= SCALE_MAX:
             raise InputError(
                 f"object: its scale is {self.scale:g}.",
@@ -252,10 +253,23 @@ class TableScene:
         Height of the table in the world, which begins at frame D's origin at the start.
     object
         What stands on it, or None.
+
+    Raises
+    ------
+    InputError
+        The table is nowhere, or out of all reach.
     """
 
     table_z_mm: float
     object: ScanObject | None = None
+
+    def __post_init__(self) -> None:
+        _require_number("table_z_mm", self.table_z_mm)
+        if abs(self.table_z_mm) > _TABLE_FAR_MM:
+            raise InputError(
+                f"table_z_mm is {self.table_z_mm:g}.",
+                f"Give mm from {-_TABLE_FAR_MM:g} to {_TABLE_FAR_MM:g}.",
+            )
 
     @property
     def solids(self) -> tuple[Solid, ...]:
@@ -320,7 +334,7 @@ def of_description(scene: Mapping[str, Any]) -> TableScene:
     Raises
     ------
     InputError
-        It describes no table.
+        It describes no table, or no object that there can be.
 
     Examples
     --------
@@ -328,19 +342,22 @@ def of_description(scene: Mapping[str, Any]) -> TableScene:
     >>> of_description(scene.describe()["scene"]) == scene
     True
     """
-    what = scene.get("object")
-    try:
-        return TableScene(
-            table_z_mm=float(scene["table_z_mm"]),
-            object=None if what is None else ScanObject(**what),
-        )
-    except InputError:
-        raise
-    except (KeyError, TypeError, ValueError):
-        raise InputError(
-            f"A scene can't be made of {dict(scene)}.",
-            "It needs table_z_mm, and object with shape, scale, x_mm, y_mm, yaw_deg.",
-        ) from None
+    if "table_z_mm" not in scene:
+        raise InputError("The scene has no table_z_mm.", "Give the table's height.")
+    table_z_mm, what = scene["table_z_mm"], scene.get("object")
+    if what is None:
+        return TableScene(table_z_mm=table_z_mm)
+    names = [field.name for field in dataclasses.fields(ScanObject)]
+    if not isinstance(what, Mapping) or "shape" not in what:
+        raise InputError(f"object is {what!r}.", f"Give [object] with {', '.join(names)}.")
+    if unknown := sorted(set(what) - set(names)):
+        raise InputError(f"object: there is no {unknown[0]!r}.", f"It has {', '.join(names)}.")
+    return TableScene(table_z_mm=table_z_mm, object=ScanObject(**what))
+
+
+def _require_number(name: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{name} is {value!r}.", "Give a number.")
 
 
 class UnknownScene:

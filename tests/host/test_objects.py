@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from setae.config import load, replaced
 from setae.errors import ConfigError, InputError
-from setae.objects import SHAPES, ScanObject, random_object, table_scene
+from setae.objects import SHAPES, ScanObject, of_description, random_object, table_scene
 from setae.perception import surface
 from setae.sim import World, add_solid
 
@@ -37,6 +38,25 @@ def test_a_random_object_lies_in_the_area_that_is_scanned_or_is_refused() -> Non
     assert random_object("orange", 2) == ScanObject(
         shape="orange", scale=1.13, x_mm=119.7, y_mm=147.9, yaw_deg=-116.2
     )
+
+
+@pytest.mark.parametrize(
+    ("scene", "said"),
+    [
+        ({}, "no table_z_mm"),
+        ({"table_z_mm": "low"}, "table_z_mm is 'low'. Give a number."),
+        ({"table_z_mm": math.nan}, "table_z_mm is nan"),  # the simulator told of a box's centre
+        ({"table_z_mm": -1e9}, "from -5000 to 5000"),  # the scan took for ever
+        ({"table_z_mm": -138.0, "object": "coil"}, "Give [object] with shape, scale, x_mm"),
+        ({"table_z_mm": -138.0, "object": {"x_mm": 3.0}}, "Give [object] with shape"),
+        ({"table_z_mm": -138.0, "object": {"shape": "coil", "hue": 3}}, "there is no 'hue'"),
+        ({"table_z_mm": -138.0, "object": {"shape": "coil", "x_mm": "a"}}, "x_mm is 'a'."),
+    ],
+)
+def test_what_is_wrong_with_a_scene_is_named(scene: dict[str, object], said: str) -> None:
+    # All of it was told, with a table that nobody had given, and not what was wrong.
+    with pytest.raises(InputError, match=re.escape(said)):
+        of_description(scene)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

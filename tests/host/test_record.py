@@ -260,6 +260,11 @@ def test_a_disk_that_fails_is_a_log_error(tmp_path: Path, monkeypatch: pytest.Mo
         recorder.command(3_500_000, "tick")
     assert len(read(path).messages("/command")) == 200
     recorder.close()
+    # An empty file stayed, which was no log: the run before could not be resumed any more.
+    monkeypatch.setattr(type(recorder._writer), "add_metadata", full)
+    with pytest.raises(LogError, match="No space left"):
+        Recorder(tmp_path / "run-2.mcap")
+    assert [each.name for each in tmp_path.iterdir()] == ["run.mcap"]
 
 
 def test_a_path_that_may_not_be_made_is_said(

@@ -59,6 +59,7 @@ def test_the_command_scans_in_two_modes_and_reports_them_side_by_side(
     [
         (("--object", "apple"), "There is no object 'apple'. Give one of lidded_container"),
         (("--object", "eraser:x"), "is no seed"),
+        (("--object", ""), "There is no object ''."),  # it was an eraser
         # It stood outside of the area: all places were empty, and nothing said so.
         (("--object", "eraser:1", "--area", "60"), "eraser:1 doesn't fit into the scanned 60 x 60"),
         (("--area", "wide"), "is no area. Give mm: --area 200 or --area 120x80."),
@@ -287,8 +288,22 @@ def test_a_real_scan_says_that_its_height_window_is_not_checked(
     # The default height is the whole window, so the check passed whatever stood there.
     main_ends(1, "scan", "--port", "/dev/null")
     assert "Nobody said how tall the object is" in capsys.readouterr().err
-    main_ends(1, "scan", "--port", "/dev/null", "--tallest", "30")
-    assert "Nobody said" not in capsys.readouterr().err
+    for tallest, said in (("30", ""), ("45", ""), ("300", "Raise the arm's start by 255 mm")):
+        main_ends(1, "scan", "--port", "/dev/null", "--tallest", tallest)
+        error = capsys.readouterr().err
+        assert said in error
+        assert "Nobody said" not in error
+
+
+def test_an_object_that_stands_beside_the_scanned_square_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # All places were empty, and nothing said why.
+    scene = tmp_path / "scene.toml"
+    for x_mm, told in ((300.0, True), (210.0, False)):
+        scene.write_text(f'[object]\nshape = "orange"\nx_mm = {x_mm}\n')
+        main_ends(1, "scan", "--sim", "--scene", str(scene), "--plant", "none")
+        assert ("beside the scanned 200 x 200 mm" in capsys.readouterr().err) == told
 
 
 def test_a_scene_without_its_table_has_it_low_enough_for_what_stands_on_it(

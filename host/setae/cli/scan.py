@@ -94,7 +94,7 @@ def scan(
     else:
         config = scan_jobs.settings(where, area, step, order, tallest)
         jobs = scan_jobs.fresh(config, where, mode or ["paper"], object, scene)
-        if not where.simulated:
+        if not where.simulated and tallest is None:
             scan_jobs.warn_of_no_height(config)
         folder = cache(lambda: new_folder("scan", run.out, force=run.force))
     for job in jobs:

@@ -18,7 +18,7 @@ from setae.config import Config
 from setae.errors import InputError, LogError
 from setae.experiments import scan as scans
 from setae.experiments.scan import Mode, ScanResult
-from setae.objects import TableScene, of_description, random_object, table_scene
+from setae.objects import ScanObject, TableScene, of_description, random_object, table_scene
 from setae.record import Log
 
 __all__ = ["SAME_START_MM", "Job", "fresh", "resumed", "settings", "warn_of_no_height"]
@@ -78,7 +78,7 @@ def settings(
 def warn_of_no_height(config: Config) -> None:
     """Say that the height window can't be checked: the configured height is all of it."""
     window_mm = scans.window_mm(config)
-    if config.scan.tallest_mm >= window_mm:
+    if config.scan.tallest_mm == window_mm:
         tell(
             f"Nobody said how tall the object is, so that it fits is not checked. It may rise "
             f"{window_mm:g} mm above the extended bristle's tip; --tallest says how far it does."
@@ -107,7 +107,7 @@ def fresh(
     if where.simulated:
         if object_ is not None and scene is not None:
             raise InputError("--object and --scene exclude each other.", "Give one of them.")
-        place = _scene(config, scene) if scene else _object(config, object_ or "eraser")
+        place = _scene(config, scene) if scene else _object(config, object_)
         config = scans.in_scene(config, place)
     elif object_ is not None or scene is not None:
         raise InputError("--object and --scene are for the simulator.", "Give --sim too.")
@@ -117,8 +117,8 @@ def fresh(
     return [dataclasses.replace(job, mode=mode) for mode in modes]
 
 
-def _object(config: Config, text: str) -> TableScene:
-    shape, _, seed = text.partition(":")
+def _object(config: Config, text: str | None) -> TableScene:
+    shape, _, seed = ("eraser" if text is None else text).partition(":")
     if shape == "none":
         return table_scene(config)
     if seed and not seed.isdecimal():
@@ -151,7 +151,23 @@ def _scene(config: Config, path: Path) -> TableScene:
         raise InputError(
             f"The scene {path} has no {sorted(unknown)[0]!r}.", "It has table_z_mm and [object]."
         )
+    _warn_of_outside(config, found.object)
     return found
+
+
+def _warn_of_outside(config: Config, what: ScanObject | None) -> None:
+    """Say that an object stands wholly beside the scanned square, where nobody feels it."""
+    if what is None:
+        return
+    width_mm, depth_mm = config.scan.area_mm
+    beside_mm = math.hypot(
+        max(-what.x_mm, what.x_mm - width_mm, 0.0), max(-what.y_mm, what.y_mm - depth_mm, 0.0)
+    )
+    if beside_mm > what.radius_mm:
+        tell(
+            f"The {what.shape} at {what.x_mm:g}, {what.y_mm:g} mm stands beside the scanned "
+            f"{width_mm:g} x {depth_mm:g} mm: nothing of it will be felt."
+        )
 
 
 def resumed(path: Path, where: Where) -> tuple[list[Job], Callable[[], Path]]:

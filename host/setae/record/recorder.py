@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections.abc import Mapping
@@ -61,12 +62,20 @@ class Recorder:
                 f"{self.path} can't be made: {error.strerror}.", "Check the folder."
             ) from error
         self._writer = Writer(self._file)
-        with self._errors:
-            self._writer.start(profile=PROFILE, library=LIBRARY)
-            self._write_metadata(metadata or {})
-            self._channels = {topic: self._register(topic) for topic in TOPICS}
-            # A run that is killed at once leaves a log that says what it was to be.
-            self._file.flush()
+        try:
+            with self._errors:
+                self._writer.start(profile=PROFILE, library=LIBRARY)
+                self._write_metadata(metadata or {})
+                self._channels = {topic: self._register(topic) for topic in TOPICS}
+                # A run that is killed at once leaves a log that says what it was to be.
+                self._file.flush()
+        except BaseException:
+            # Without its beginning it is no log, and would be in the way of the next.
+            with contextlib.suppress(OSError):
+                self.path.unlink()
+            with contextlib.suppress(OSError):
+                self._file.close()
+            raise
 
     def _register(self, topic: str) -> int:
         number = self._writer.register_schema(
