@@ -397,13 +397,17 @@ class ArmFrozenError(StageError):
 
 
 class ArmStoppedError(StageError):
-    """The arm did not get to where it was sent.
+    """The arm takes no moves any more, or did not get to where it was sent.
 
-    Examples of when it happens: someone stopped the program or set the speed slider
-    to zero, the host stalled and the controller's watchdog stopped the arm.
+    Examples of when it happens: someone pressed Stop or Pause on the pendant, also while the
+    arm rested, or set the speed slider to zero; the host did not look after a moving arm, and
+    the controller's watchdog stopped it.
     """
 
-    default_remedy = "Look at the pendant; then start the run again."
+    default_remedy = (
+        "Look at the pendant; then start the run again, or go on with a scan by"
+        " `setae scan --resume`."
+    )
 
 
 class ArmBoxError(StageError):

@@ -16,6 +16,7 @@ from setae.errors import (
     ArmBoxError,
     ArmFrozenError,
     ArmSafetyError,
+    ArmStoppedError,
     StageError,
     StoppedError,
 )
@@ -114,6 +115,28 @@ def test_an_arm_that_fails_while_it_lowers_stops_the_robot(
                 with pytest.raises(StoppedError):
                     opened.robot.move_to((0, 0, 60))
     assert not hasattr(caught.value, "__notes__"), "it was told more than once"
+
+
+def test_a_stop_that_is_pressed_while_the_robot_feels_stops_it(fake: FakeController) -> None:
+    """Nobody looked at the program of an arm at rest: the robot went on, and the next move
+    started the program again.
+    """
+    config = quick()
+    with rig.open("sim://", config=config, stage=fake.url) as opened:
+        opened.robot.enable()
+        told = fake.told()
+
+        def once_lowered(_: Event) -> None:
+            if not opened.stage.moving and opened.stage.position_mm[2] < -ON_THE_WAY_MM:
+                fake.tell("stop_program")
+                told.update(fake.told())
+
+        opened.robot.session.subscribe(once_lowered)
+        with pytest.raises(ArmStoppedError, match="stopped or paused at the controller"):
+            explore(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
+        assert opened.robot.state is State.STOPPED
+    assert told["move"]
+    assert fake.told() == told, "it moved, or its program runs again"
 
 
 def test_a_contact_while_the_arm_lowers_stops_the_arm(fake: FakeController) -> None:

@@ -30,7 +30,10 @@ from tests.ur.controller import patient
 config = load()
 settings = dataclasses.replace(patient(config.ur), watchdog_hz=5.0)
 stage = UrStage(sys.argv[1], dataclasses.replace(config, ur=settings))
-stage.move_to((0, 0, -300), speed_mm_s=20)
+stage.move_to((0, 0, float(sys.argv[2])), speed_mm_s=20)
+while stage.moving and sys.argv[2] == "-1":
+    stage.poll(0)
+    time.sleep(0.005)
 try:
     print(stage._process.pid, flush=True)
     while True:
@@ -52,9 +55,9 @@ def line(pipe: IO[str]) -> str:
 
 
 @contextmanager
-def script(fake: FakeController) -> Iterator[subprocess.Popen[str]]:
+def script(fake: FakeController, z_mm: str = "-300") -> Iterator[subprocess.Popen[str]]:
     with subprocess.Popen(
-        [sys.executable, "-c", SCRIPT, fake.url],
+        [sys.executable, "-c", SCRIPT, fake.url, z_mm],
         cwd=Path(__file__).parents[2],
         stdout=subprocess.PIPE,
         text=True,
@@ -103,6 +106,13 @@ def test_a_controller_that_freezes_while_it_is_connected_to_holds_up_nobody(
         pass
 
 
+def test_a_python_that_is_not_to_be_found_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program with Python inside has none: a traceback from the standard library told so."""
+    monkeypatch.setattr(sys, "executable", "")
+    with pytest.raises(StageError, match="can't be started"):
+        UrStage("ur://127.0.0.250", with_ur())
+
+
 def test_a_library_that_ends_is_told(fake: FakeController) -> None:
     """Without it nobody would brake, or say why."""
     with connected(fake) as stage:
@@ -116,6 +126,22 @@ def test_a_library_that_ends_is_told(fake: FakeController) -> None:
             stage.stop()
 
 
+def test_closing_does_not_wait_for_a_fork_that_holds_the_pipe(fake: FakeController) -> None:
+    """The reading thread held the pipe's lock for as long as anybody could write into it."""
+    with connected(fake) as stage:
+        pipe = stage._process._process.stdout
+        assert pipe is not None
+        number = os.fstat(pipe.fileno()).st_ino
+        opened = Path(f"/proc/{stage._process.pid}/fd").iterdir()
+        held = os.open(next(fd for fd in opened if fd.stat().st_ino == number), os.O_WRONLY)
+        try:
+            stage.close()
+        finally:
+            os.close(held)
+        with pytest.raises(ArmFrozenError, match="was ended"):
+            stage._process.submit("a stop", "brake", 200.0).wait(TIMEOUT_S)
+
+
 def test_a_library_that_hangs_holds_up_nobody(fake: FakeController) -> None:
     with connected(fake, state_age_s=1.0) as stage:
         os.kill(stage._process.pid, signal.SIGSTOP)
@@ -123,9 +149,10 @@ def test_a_library_that_hangs_holds_up_nobody(fake: FakeController) -> None:
             poll_until(stage, lambda: False)
 
 
-def test_a_host_that_is_killed_takes_the_library_along(fake: FakeController) -> None:
+@pytest.mark.parametrize("z_mm", ["-300", "-1"], ids=["moving", "resting"])
+def test_a_host_that_is_killed_takes_the_library_along(fake: FakeController, z_mm: str) -> None:
     """A process that outlived it could go on telling the controller that the host lives."""
-    with script(fake) as host:
+    with script(fake, z_mm) as host:
         assert host.stdout is not None
         library = os.pidfd_open(int(line(host.stdout)))
         try:

@@ -13,7 +13,13 @@ from tests.ur.controller import FakeController, patient
 from setae import record, rig
 from setae.cli import main
 from setae.config import Config, load
-from setae.errors import ArmBoxError, ArmFrozenError, ArmSafetyError, StageError
+from setae.errors import (
+    ArmBoxError,
+    ArmFrozenError,
+    ArmSafetyError,
+    ArmStoppedError,
+    StageError,
+)
 from setae.experiments.scan import read, scan, simulate
 from setae.link.events import Event
 from setae.objects import ScanObject, TableScene, table_scene
@@ -84,6 +90,26 @@ def test_an_arm_that_fails_in_a_step_stops_the_robot(
             scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
         assert opened.robot.state is State.STOPPED
         assert ON_THE_WAY_MM < opened.stage.position_mm[0] < config.scan.step_mm
+
+
+def test_a_stop_that_is_pressed_between_two_steps_ends_the_scan(fake: FakeController) -> None:
+    """It passed for a watchdog that had expired: the arm went on through all places."""
+    config, scene = quick()
+    with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
+        opened.robot.enable()
+        told = fake.told()
+
+        def between_steps(_: Event) -> None:
+            if not opened.stage.moving and opened.stage.position_mm[0] > ON_THE_WAY_MM:
+                fake.tell("stop_program")
+                told.update(fake.told())
+
+        opened.robot.session.subscribe(between_steps)
+        with pytest.raises(ArmStoppedError, match="scan --resume"):
+            scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
+        assert opened.robot.state is State.STOPPED
+    assert told["move"]
+    assert fake.told() == told, "it moved, or its program runs again"
 
 
 def test_a_corner_outside_of_the_box_is_told_before_anything_moves(fake: FakeController) -> None:

@@ -24,7 +24,6 @@ from setae.errors import (
     ArmModeError,
     ArmRemoteError,
     ArmSafetyError,
-    ArmStoppedError,
     ArmUnreachableError,
     InputError,
     StageError,
@@ -279,10 +278,25 @@ def test_closing_twice_says_goodbye_once(
     with connected(fake) as stage:
         stage.close()
         assert not fake.told()["playing"], "the program on the controller goes on"
+        with pytest.raises(StageError, match="let go of"):
+            stage.move_to((0, 0, -1))
         submitted: list[str] = []
         monkeypatch.setattr(stage._process, "submit", lambda what, _: submitted.append(what))
         stage.close()
     assert not submitted
+
+
+def test_a_second_stage_on_the_same_arm_is_refused(fake: FakeController) -> None:
+    """A notebook's cell that was run twice left the first one connected, and a real controller
+    then says that registers are in use.
+    """
+    with connected(fake) as stage:
+        with pytest.raises(StageError, match=r"drives the arm at .* already"):
+            UrStage(fake.url, with_ur())
+        stage.move_to((0, 0, -1))
+        poll_until(stage, lambda: not stage.moving)
+    with connected(fake):
+        pass
 
 
 def test_a_box_that_was_never_set_is_told(fake: FakeController) -> None:
@@ -326,51 +340,6 @@ def test_a_protective_stop_in_mid_move_is_noticed(fake: FakeController) -> None:
             poll_until(stage, lambda: False)
         stage.stop()
         assert not stage.moving, "it braked for ever, as far as it told"
-
-
-@pytest.mark.parametrize(
-    ("line", "says"), [("stop_program", "its program has ended"), ("slider 0", "speed slider")]
-)
-def test_an_arm_that_was_stopped_by_someone_says_so(
-    fake: FakeController, line: str, says: str
-) -> None:
-    with connected(fake) as stage:
-        stage.move_to((0, 0, -80))
-        poll_until(stage, lambda: far_on_its_way(stage))
-        fake.tell(line)
-        with pytest.raises(ArmStoppedError, match=says):
-            poll_until(stage, lambda: False)
-
-
-def test_the_controllers_watchdog_stops_the_arm_of_a_host_that_hangs(
-    fake: FakeController,
-) -> None:
-    with connected(fake, watchdog_hz=5.0) as stage:
-        stage.move_to((0, 0, -300), speed_mm_s=20)
-        poll_until(stage, lambda: far_on_its_way(stage))
-        # The host hangs: nobody polls, and after a fifth of a second the controller acts.
-        end_s = time.monotonic() + TIMEOUT_S
-        # Two connections tell of it: one may be a report behind the other.
-        while (state := stage._process.state).program_runs or state.speed_mm_s != 0:
-            assert time.monotonic() < end_s
-            time.sleep(0.005)
-        assert stage.position_mm[2] > -100
-
-
-def test_a_pause_of_the_host_at_rest_costs_nothing(fake: FakeController) -> None:
-    """A trajectory that was computed for long let the watchdog end the arm's program: the
-    next move was refused.
-    """
-    with connected(fake, watchdog_hz=5.0) as stage:
-        end_s = time.monotonic() + TIMEOUT_S
-        while stage._process.state.program_runs:
-            assert time.monotonic() < end_s
-            time.sleep(0.005)
-        stage.move_to((0, 0, -5))
-        poll_until(stage, lambda: not stage.moving)
-        assert stage.position_mm == pytest.approx((0, 0, -5), abs=NEAR_MM)
-        # A new program without its watchdog would have passed.
-        assert fake.told()["watchdog_hz"] == 5.0
 
 
 @pytest.mark.parametrize("position_mm", [(1, 2), (0, 0, math.nan)])

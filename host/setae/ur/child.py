@@ -9,13 +9,17 @@ it ends with this process.
 Standard input brings pickles: the controller's address and the settings, then calls, each
 as number, method of `Controller` and arguments. Standard output takes pickles: an
 `ArmState` each time that the controller has told a new one, and for each call its number
-and what it raised, or None. Nothing is said to the controller that was not asked for.
+and what it raised, or None. Nothing is said to the controller that was not asked for, but
+for one thing: as long as the arm rests and the host lives, its watchdog is fed. So a program
+that ends at rest was stopped by somebody, however long the host thinks.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pickle
+import queue
 import select
 import signal
 import sys
@@ -26,10 +30,14 @@ from typing import Any, BinaryIO, Final
 from setae.errors import ArmFrozenError
 from setae.ur.controller import ArmState, Controller
 
-_PERIOD_S: Final = 0.002
+_PERIOD_S: Final = 0.004
+_FEEDS_PER_PERIOD: Final = 4
 # A call that hangs with Python's lock held leaves nobody to see that the host has ended: then
 # the kernel ends this process. Longer than the host ever waits for such a call.
 _LEASE_S: Final = 20
+
+
+_Calls = queue.SimpleQueue[tuple[int, str, tuple[Any, ...]]]
 
 
 class _Told:
@@ -67,24 +75,42 @@ def _watch(controller: Controller, told: _Told, connected: threading.Event, host
         time.sleep(_PERIOD_S)
         if not connected.is_set():
             continue
-        try:
-            state = controller.state()
-        except ArmFrozenError:  # the library has none: the host sees that nothing comes
-            continue
-        if state.timestamp_s != last_s:
-            last_s = state.timestamp_s
-            told.offer(state)
+        # The library has none where it raises: the host sees that nothing comes.
+        with contextlib.suppress(ArmFrozenError, BrokenPipeError):
+            if controller.timestamp_s != last_s:
+                state = controller.state()
+                last_s = state.timestamp_s
+                told.offer(state)
     os._exit(0)
 
 
-def _serve(calls: BinaryIO, told: _Told, host: int) -> None:
+def _take(pipe: BinaryIO, calls: _Calls) -> None:
+    """Take calls until the host has ended, or has closed the pipe: then end, whatever hangs."""
+    try:
+        while True:
+            calls.put(pickle.load(pipe))
+    except (EOFError, pickle.UnpicklingError):
+        os._exit(0)  # the library's threads would hold up an ordinary end
+
+
+def _serve(pipe: BinaryIO, told: _Told, host: int) -> None:
     """Make one call after the other, until the host has ended."""
-    controller = Controller(*pickle.load(calls))
+    address, settings = pickle.load(pipe)
+    controller = Controller(address, settings)
     connected = threading.Event()
     watching: tuple[Any, ...] = (controller, told, connected, host)
     threading.Thread(target=_watch, args=watching, daemon=True).start()
+    calls: _Calls = queue.SimpleQueue()
+    threading.Thread(target=_take, args=(pipe, calls), daemon=True).start()
+    feed_s = 1 / (_FEEDS_PER_PERIOD * settings.watchdog_hz)
     while True:
-        number, method, arguments = pickle.load(calls)
+        try:
+            number, method, arguments = calls.get(timeout=feed_s)
+        except queue.Empty:
+            with contextlib.suppress(ArmFrozenError):  # the host's own next call tells
+                if controller.rests:
+                    controller.kick_watchdog()
+            continue
         failure: Exception | None = None
         try:
             getattr(controller, method)(*arguments)
@@ -104,7 +130,7 @@ def main() -> None:
         try:
             _serve(sys.stdin.buffer, _Told(pipe), host)
         except (EOFError, BrokenPipeError):
-            os._exit(0)  # the library's threads would hold up an ordinary end
+            os._exit(0)
 
 
 if __name__ == "__main__":

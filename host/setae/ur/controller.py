@@ -22,7 +22,10 @@ from setae.errors import (
     StageError,
 )
 
-__all__ = ["RUNNING", "ArmState", "Controller", "check"]
+__all__ = ["REST_MM_S", "RUNNING", "STOPPED", "ArmState", "Controller", "check"]
+
+REST_MM_S: Final = 1.0
+STOPPED: Final = "The arm's program was stopped or paused at the controller"
 
 # Robot modes and safety modes of UR's RTDE guide.
 RUNNING: Final = 7
@@ -41,7 +44,8 @@ _STOPS: Final = {
 _STATE_HZ: Final = 125.0
 _RTDE_PORT: Final = 30004
 _CONNECT_TIMEOUT_S: Final = 3.0
-_PROGRAM_POLL_S: Final = 0.01
+# A protective stop ends the program too, and may be told a report later: by then it is known.
+_ENDED_S: Final = 0.05
 _FIELDS: Final = [
     "timestamp", "actual_TCP_pose", "actual_TCP_speed", "robot_mode", "safety_mode",
     "runtime_state",
@@ -63,7 +67,7 @@ class ArmState:
     robot_mode, safety_mode
         UR's numbers.
     program_runs
-        Whether it takes moves.
+        Whether it takes moves. False once it has taken none for 0.05 s.
     """
 
     timestamp_s: float
@@ -120,6 +124,8 @@ class Controller:
         self._settings = settings
         self._receive: Any = None
         self._control: Any = None
+        self._moves = self._braked = False
+        self._ended_s: float | None = None
 
     def connect(self) -> None:
         """Connect, check that the arm may move, and tell it what it carries.
@@ -204,11 +210,33 @@ class Controller:
             speed_mm_s=1000 * math.hypot(*receive.getActualTCPSpeed()[:3]),
             robot_mode=receive.getRobotMode(),
             safety_mode=receive.getSafetyMode(),
-            program_runs=self._control is not None and self._control.isProgramRunning(),
+            program_runs=self._control is not None and not self._program_has_ended(),
         )
 
-    def _program_runs(self) -> bool:
-        return bool(self._call("its program", self._control.isProgramRunning))
+    def _program_has_ended(self) -> bool:
+        now_s = time.monotonic()
+        if self._control.isProgramRunning():
+            self._ended_s = None
+        elif self._ended_s is None:
+            self._ended_s = now_s
+        return self._ended_s is not None and now_s - self._ended_s > _ENDED_S
+
+    @property
+    def timestamp_s(self) -> float:
+        """Of the last state; never waits. Raises ArmFrozenError where there is none."""
+        timestamp_s: float = self._call("its state", lambda: self._receive.getTimestamp())
+        return timestamp_s
+
+    @property
+    def rests(self) -> bool:
+        """Whether there is nothing that the watchdog would have to stop."""
+        if self._braked and self.state().speed_mm_s < REST_MM_S:
+            self.rest()
+        return self._control is not None and not self._moves
+
+    def rest(self) -> None:
+        """The arm has arrived: until the next move it needs nobody who looks after it."""
+        self._moves = self._braked = False
 
     def kick_watchdog(self) -> None:
         """Tell the controller that the host lives."""
@@ -219,33 +247,31 @@ class Controller:
 
         Raises
         ------
+        ArmStoppedError
+            The program has ended. It is never started again by itself: nobody can know why
+            somebody stopped it.
         StageError
             The controller did not take it.
         """
-        # A watchdog that was not fed between two moves ended the program.
-        if not self._program_runs():
-            self._call("a new program", self._control.reuploadScript)
-            self._wait_for_program()
-            self._call("its load", self._prepare)
+        self._require_program()
+        self._moves, self._braked = True, False
         target = [*(value / 1000 for value in pose[:3]), *pose[3:]]
         taken = self._call(
             "a move",
             lambda: self._control.moveL(target, speed_mm_s / 1000, acceleration_mm_s2 / 1000, True),
         )
         if not taken:
+            self._require_program()
             raise StageError("The arm's controller refused the move.", "Look at the pendant.")
 
-    def _wait_for_program(self) -> None:
-        """The upload comes back before the program runs; until then commands fail."""
-        end_s = time.monotonic() + self._settings.command_deadline_s / 2
-        while not self._program_runs():
-            if time.monotonic() > end_s:
-                raise ArmStoppedError("The arm's controller does not start its program.")
-            time.sleep(_PROGRAM_POLL_S)
+    def _require_program(self) -> None:
+        if not self._call("its program", self._control.isProgramRunning):
+            raise ArmStoppedError(f"{STOPPED}.")
 
     def brake(self, deceleration_mm_s2: float) -> None:
         """Start braking."""
         self._call("a stop", lambda: self._control.stopL(deceleration_mm_s2 / 1000, True))
+        self._braked = True
 
     def close(self) -> None:
         """End the program on the controller; the connections end with the process."""

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from typing import Final, Literal
 
 from setae.config import Ur
-from setae.errors import ArmFrozenError
+from setae.errors import ArmFrozenError, StageError
 from setae.ur.controller import ArmState
 
 __all__ = ["ArmProcess", "Job"]
@@ -26,7 +26,7 @@ __all__ = ["ArmProcess", "Job"]
 _MODULE: Final = "setae.ur.child"
 _END_TIMEOUT_S: Final = 1.0
 
-Method = Literal["connect", "move", "brake", "kick_watchdog", "close"]
+Method = Literal["connect", "move", "rest", "brake", "kick_watchdog", "close"]
 
 
 class Job:
@@ -88,6 +88,11 @@ class ArmProcess:
     clock
         Seconds, of the host.
 
+    Raises
+    ------
+    StageError
+        It can't be started.
+
     Attributes
     ----------
     ended : str or None
@@ -104,14 +109,21 @@ class ArmProcess:
         self._printed = tempfile.TemporaryFile()  # noqa: SIM115  # as long as the process lives
         # -P, and no "" in the path: a file in a notebook's folder can't stand in for a module. The
         # group of its own: Ctrl-C in a terminal or a notebook is for the host alone.
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", _MODULE],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._printed,
-            process_group=0,
-        )
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable or "", "-P", "-m", _MODULE],
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._printed,
+                process_group=0,
+            )
+        except OSError as error:
+            self._printed.close()
+            raise StageError(
+                f"The process that talks to the arm's controller can't be started: {error}.",
+                "It needs the Python that sys.executable names.",
+            ) from error
         assert self._process.stdin is not None
         self._calls = self._process.stdin.fileno()
         # A process that takes no calls must not hold up the host.
@@ -145,7 +157,7 @@ class ArmProcess:
                 return job
             number = next(self._numbers)
             self._jobs[number] = job
-        self._write((number, method, arguments))
+            self._write((number, method, arguments))
         return job
 
     def _write(self, call: tuple[object, ...]) -> None:
@@ -155,21 +167,29 @@ class ArmProcess:
             os.write(self._calls, pickle.dumps(call))
 
     def _read(self) -> None:
+        # A fork of the host may hold the pipe open: nobody but this thread can wait for that.
         assert self._process.stdout is not None
-        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):
-            while True:
-                told = pickle.load(self._process.stdout)
-                if isinstance(told, ArmState):
-                    self._state = told
-                else:
-                    number, error = told
-                    self._jobs.pop(number).finish(error)
-        ended = f"The process that talks to the arm's controller ended: {self._last_words()}."
+        with self._printed, self._process.stdout as pipe:
+            with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):
+                while True:
+                    self._hear(pickle.load(pipe))
+            self._end(
+                f"The process that talks to the arm's controller ended: {self._last_words()}."
+            )
+
+    def _hear(self, told: ArmState | tuple[int, Exception | None]) -> None:
+        if isinstance(told, ArmState):
+            self._state = told
+        else:
+            number, error = told
+            self._jobs.pop(number).finish(error)
+
+    def _end(self, why: str) -> None:
         with self._lock:
-            self.ended = ended
+            self.ended = self.ended or why
             jobs = list(self._jobs.values())
         for job in jobs:
-            job.finish(ArmFrozenError(ended))
+            job.finish(ArmFrozenError(self.ended))
 
     def _last_words(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -190,6 +210,7 @@ class ArmProcess:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_END_TIMEOUT_S)
         self._reader.join(_END_TIMEOUT_S)
-        for pipe in (self._process.stdin, self._process.stdout, self._printed):
-            assert pipe is not None
-            pipe.close()
+        # From here on nothing is written: the pipe's number may be another file's.
+        self._end("The process that talks to the arm's controller was ended.")
+        assert self._process.stdin is not None
+        self._process.stdin.close()

@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Final, Self
+from typing import ClassVar, Final, Self
 from urllib.parse import urlsplit
 
 from setae.config import Config, load
@@ -26,7 +26,7 @@ from setae.errors import (
     StageError,
 )
 from setae.stage import checked_move
-from setae.ur.controller import ArmState, check
+from setae.ur.controller import REST_MM_S, STOPPED, ArmState, check
 from setae.ur.pose import WorldFrame
 from setae.ur.process import ArmProcess, Job
 from setae.ur.watch import Watch
@@ -40,9 +40,11 @@ _GOODBYE_TIMEOUT_S: Final = 3.0
 _STATE_POLL_S: Final = 0.002
 # Arrived: this near, this slow. The controller itself is ten times as exact.
 _NEAR_MM: Final = 0.2
-_REST_MM_S: Final = 1.0
 # At rest this long away from its target, the arm was stopped by something else.
 _STUCK_S: Final = 1.0
+_KICKS_PER_PERIOD: Final = 8
+# The watchdog's period, less what the controller may count otherwise.
+_STARVED: Final = 0.9
 
 
 @dataclass(slots=True)
@@ -74,7 +76,7 @@ class UrStage:
     ArmBoxError
         Frame D is outside the box now.
     StageError
-        Frame D doesn't hang straight down.
+        Frame D doesn't hang straight down, or this program drives the arm already.
     ExtraMissingError
         ur-rtde isn't installed.
 
@@ -83,6 +85,8 @@ class UrStage:
     UserWarning
         The box is the default one.
     """
+
+    _driven: ClassVar[set[str]] = set()  # a controller takes one host
 
     def __init__(
         self, url: str, config: Config, *, clock: Callable[[], float] = time.monotonic
@@ -97,7 +101,14 @@ class UrStage:
         self._failure: StageError | None = None
         self._lost = False  # it tells nothing, or answers no more: a brake won't reach it
         self._closed = False
+        self._host = host
+        if host in self._driven:
+            raise StageError(
+                f"This program drives the arm at {host} already.",
+                "Close the earlier stage first: `stage.close()`.",
+            )
         self._process = ArmProcess(host, config.ur, clock)
+        self._driven.add(host)
         self._watch = Watch(lambda: self._process.told_s, clock)
         self._connecting = self._process.submit("connecting", "connect")
         try:
@@ -114,6 +125,7 @@ class UrStage:
         self._move: _Move | None = None
         self._braking: Job | None = None
         self._kick: Job | None = None
+        self._fed_s = self._unfed_s = 0.0
 
     def _settled_state(self) -> ArmState:
         """A state in which frame D is what the configuration says: two states on."""
@@ -203,11 +215,14 @@ class UrStage:
         ------
         ArmBoxError
             The target lies outside the box.
+        ArmFrozenError, ArmSafetyError, ArmModeError, ArmStoppedError
+            It has failed since it was polled last.
         StageError
             The arm is moving, has failed before, or a value is no good.
         """
         if self._failure is not None:
             raise self._failure
+        self.poll(0)
         move = checked_move(position_mm, speed_mm_s, acceleration_mm_s2, self._config.stage)
         if self.moving:
             raise StageError("The arm is moving already.", "Wait for it, or stop it first.")
@@ -215,6 +230,7 @@ class UrStage:
         pose = [*self.base_mm(move.target_mm), *self._state.pose[3:]]
         job = self._process.submit("a move", "move", pose, move.speed_mm_s, move.acceleration_mm_s2)
         self._move = _Move(move.target_mm, job)
+        self._fed_s, self._unfed_s = job.submitted_s, 0.0
 
     def stop(self) -> None:
         """Brake now; returns without waiting for rest.
@@ -261,40 +277,60 @@ class UrStage:
         if unseen_s > self._settings.state_age_s:
             raise self._lose(f"The arm's controller has told nothing for {unseen_s:.2f} s.")
         check(state)
-        self._feed_watchdog()
+        if self.moving:
+            self._unfed_s = max(self._unfed_s, now_s - self._fed_s)
+        if not state.program_runs:
+            raise self._program_ended()
+        self._feed_watchdog(now_s)
         if self._braking is not None:
             self._watch_braking(self._braking, now_s)
         if self._move is not None:
             self._watch_move(self._move, now_s)
 
-    def _feed_watchdog(self) -> None:
+    def _program_ended(self) -> ArmStoppedError:
+        # At rest its watchdog is fed by the process, however long the host thinks.
+        if self.moving and self._unfed_s > _STARVED / self._settings.watchdog_hz:
+            return ArmStoppedError(
+                f"The controller's watchdog stopped the arm: for {self._unfed_s:.2f} s of its move"
+                " this host gave no sign of life.",
+                "Close this stage, connect anew, and poll while it moves, as `Robot.wait` does.",
+            )
+        if self._move is None:
+            return ArmStoppedError(f"{STOPPED}.")
+        left_mm = math.dist(self.position_mm, self._move.target_mm)
+        return ArmStoppedError(f"{STOPPED}, {left_mm:.1f} mm before its target.")
+
+    def _feed_watchdog(self, now_s: float) -> None:
         if self._kick is not None:
             if not self._kick.done:
                 return
             self._kick.check()
+            if now_s - self._fed_s < 1 / (_KICKS_PER_PERIOD * self._settings.watchdog_hz):
+                return
         self._kick = self._process.submit("a sign of life", "kick_watchdog")
+        self._fed_s = self._kick.submitted_s
 
     def _watch_braking(self, braking: Job, now_s: float) -> None:
-        if self._taken(braking, now_s) and self._state.speed_mm_s < _REST_MM_S:
+        if self._taken(braking, now_s) and self._state.speed_mm_s < REST_MM_S:
             self._braking = None
+            self._process.submit("rest", "rest")
 
     def _watch_move(self, move: _Move, now_s: float) -> None:
         if not self._taken(move.job, now_s):
             return
         left_mm = math.dist(self.position_mm, move.target_mm)
-        if self._state.speed_mm_s >= _REST_MM_S:
+        if self._state.speed_mm_s >= REST_MM_S:
             move.resting_since_s = None
         elif left_mm < _NEAR_MM:
             self._move = None
+            self._process.submit("rest", "rest")
         elif move.resting_since_s is None:
             move.resting_since_s = now_s
         elif now_s - move.resting_since_s > _STUCK_S:
-            why = (
-                "the speed slider may be at zero"
-                if self._state.program_runs
-                else "its program has ended"
+            raise ArmStoppedError(
+                f"The arm rests {left_mm:.1f} mm before its target: the speed slider may be at"
+                " zero."
             )
-            raise ArmStoppedError(f"The arm rests {left_mm:.1f} mm before its target: {why}.")
 
     def _taken(self, job: Job, now_s: float) -> bool:
         """Whether the controller took a command; raises where it takes too long, or failed."""
@@ -320,11 +356,14 @@ class UrStage:
         if self._closed:
             return
         self._closed = True
+        if self._failure is None:
+            self._failure = StageError("The arm was let go of.", "Connect to it again.")
         self._watch.close()
         if self._connecting.done and not self._lost:  # else it does not answer
             with contextlib.suppress(StageError, RuntimeError):
                 self._process.submit("goodbye", "close").wait(_GOODBYE_TIMEOUT_S)
         self._process.close()
+        self._driven.discard(self._host)
 
     def __enter__(self) -> Self:
         return self
