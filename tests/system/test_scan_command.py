@@ -320,25 +320,32 @@ def test_a_scene_without_its_table_has_it_low_enough_for_what_stands_on_it(
     assert record.read(out / "paper.mcap").metadata["scene"]["table_z_mm"] == -158.0
 
 
-def test_the_map_grows_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def three_places(live: live_map.LiveMap) -> None:
+    """Events of a scan that knows one of four places, and finds the others."""
+    live.event(Event(time_us=0, name="scan_start", data={"columns": 4, "rows": 1, "known": 1}))
+    for column, mark, height_mm in ((1, "lost", None), (2, "empty", None), (3, "felt", -100.0)):
+        place = {"column": column, "row": 0, "x_mm": 10.0 * column, "y_mm": 0.0, "mark": mark,
+                 "height_mm": height_mm, "uncertainty_mm": None}  # fmt: skip
+        known = {"known": column + 1, "total": 4}
+        time_us = 50_000_000 + 5_000_000 * column
+        live.event(Event(time_us=time_us, name="place", data={**place, **known}))
+
+
+@pytest.mark.parametrize("terminal", ["xterm", "dumb"])
+def test_the_map_grows_in_a_terminal(terminal: str, monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
-    terminal = Console(file=screen, force_terminal=True, width=100)
-    monkeypatch.setattr(live_map, "console", terminal)
+    monkeypatch.setenv("TERM", terminal)
+    monkeypatch.setattr(live_map, "console", Console(file=screen, force_terminal=True, width=100))
     monkeypatch.setattr(live_map, "_REDRAW_S", 0.0)
     with live_map.LiveMap() as live:
-        live.event(Event(time_us=0, name="scan_start", data={"columns": 4, "rows": 1, "known": 1}))
-        for column, mark, height_mm in ((1, "lost", None), (2, "empty", None), (3, "felt", -100.0)):
-            place = {"column": column, "row": 0, "x_mm": 10.0 * column, "y_mm": 0.0, "mark": mark,
-                     "height_mm": height_mm, "uncertainty_mm": None}  # fmt: skip
-            known = {"known": column + 1, "total": 4}
-            time_us = 50_000_000 + 5_000_000 * column
-            live.event(Event(time_us=time_us, name="place", data={**place, **known}))
+        three_places(live)
     drawn = screen.getvalue()
     # The way to a resumed run's first place counted as a place's: hours were left.
-    assert "50%  2 of 4 places, 0 touched, 0:55 robot time\r" in drawn
+    assert re.search(r"50%  2 of 4 places, 0 touched, 0:55 robot time\s", drawn)
+    # Where nothing can be drawn anew, nothing was told.
     assert "75%  3 of 4 places, 0 touched, 1:00 robot time, about 0:05 left" in drawn
     assert "100%  4 of 4 places, 1 touched" in drawn
-    assert "L " in drawn, "a lost contact is flagged"
+    assert ("L " in drawn) == (terminal == "xterm"), "a lost contact is flagged"
 
 
 def test_a_real_robot_has_no_object(capsys: pytest.CaptureFixture[str]) -> None:

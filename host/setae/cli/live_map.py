@@ -39,7 +39,9 @@ class LiveMap:
         self._first: tuple[int, int] | None = None  # when this run's first place was known
         self._drawn_s = -math.inf
         self._told_share = 0.0
-        self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
+        # A dumb terminal can't go back to draw anew: it would show nothing until the end.
+        drawn = console.is_terminal and not console.is_dumb_terminal
+        self._live = Live(console=console, auto_refresh=False) if drawn else None
 
     def __enter__(self) -> Self:
         if self._live is not None:
