@@ -25,6 +25,8 @@ _LONGER_MM = 1.0
 # So many clearances are extended slowly at most: beyond, it takes less time to extend fast, and
 # to measure anew what was touched.
 _SLOWLY = 6.5
+# So many slowly, of which one leads to where it was touched in haste.
+_ANEW = 2.5
 
 
 def adaptive(steps: Steps, survey: Survey, settings: Scan, found: Found) -> None:
@@ -193,7 +195,7 @@ class _Tracer:
         if hasty and feeling.contact is not None:
             # Touched in haste: measure it.
             steps.lower(steps.length_over_mm(feeling.height_mm))
-            feeling = steps.feel(near_mm=2 * clearance_mm) or feel_short(steps)
+            feeling = steps.feel(near_mm=_ANEW * clearance_mm) or feel_short(steps)
         if feeling.mark == "double":
             # In touch at once: from farther up it is seen whether it is so.
             steps.retract(max(steps.short_mm, steps.length_mm - 2 * clearance_mm))
