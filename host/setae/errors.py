@@ -404,10 +404,7 @@ class ArmStoppedError(StageError):
     the controller's watchdog stopped it.
     """
 
-    default_remedy = (
-        "Look at the pendant; then start the run again, or go on with a scan by"
-        " `setae scan --resume`."
-    )
+    default_remedy = "Look at the pendant; then start the run again."
 
 
 class ArmBoxError(StageError):

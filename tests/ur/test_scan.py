@@ -105,7 +105,7 @@ def test_a_stop_that_is_pressed_between_two_steps_ends_the_scan(fake: FakeContro
                 told.update(fake.told())
 
         opened.robot.session.subscribe(between_steps)
-        with pytest.raises(ArmStoppedError, match="scan --resume"):
+        with pytest.raises(ArmStoppedError, match="stopped or paused at the controller"):
             scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
         assert opened.robot.state is State.STOPPED
     assert told["move"]
