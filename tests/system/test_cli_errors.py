@@ -215,7 +215,7 @@ def test_doctor_goes_on_after_what_is_wrong_and_exits_with_1(
     [
         ('[object]\nshape = "ball"\n', "There is no object 'ball'. Give one of"),
         ('[object]\nshape = "orange"\nscale = 5\n', "scale is 5. Give a number from 0.8 to 1.2."),
-        ('[object]\nshape = "orange"\ncolour = 5\n', "'colour': 5}"),
+        ('[object]\nshape = "orange"\ncolour = 5\n', "object: there is no 'colour'. It has shape"),
     ],
 )
 def test_a_broken_scene(
