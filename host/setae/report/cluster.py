@@ -82,8 +82,8 @@ def clouds_picture(path: Path, found: Comparison) -> Path:
         top = style.headline(
             figure, "What the bristle felt of each object",
             f"{_origin(found)}. (a) to ({chr(96 + len(shapes))}): the first of the scans of each, "
-            f"about the middle of its points. ({plane}): all {len(found.samples)} scans, in the "
-            "paper's form.",
+            f"about the middle of its points. ({plane}): all {len(found.samples)} scans, as in the "
+            "paper.",
         )  # fmt: skip
         grid = figure.add_gridspec(rows, columns, left=0.01, right=0.985, bottom=0.85 / height,
                                    top=top - 0.32 / height, wspace=0.1, hspace=0.16)  # fmt: skip
