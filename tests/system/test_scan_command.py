@@ -186,6 +186,8 @@ def test_of_a_log_in_which_no_scan_had_begun_its_own_mode_is_done_and_none_repor
     assert f"Left out: {out / 'safe.mcap'} holds no scan." in printed.err
     assert read(out).mode == "paper"
     main_ends(0, "scan", "--resume", str(out / "safe.mcap"), "--no-report")
+    # It said that --force, which nobody had given, replaced the log.
+    assert "--force" not in capsys.readouterr().out
     assert read_parts([record.read(out / "safe.mcap")]).complete
     assert not (out / "paper-2.mcap").exists()
 

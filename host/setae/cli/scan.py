@@ -17,7 +17,15 @@ from setae.cli import scan_jobs
 from setae.cli.arm import show_arm_targets
 from setae.cli.common import Where, app, console, interrupts, new_folder
 from setae.cli.live_map import LiveMap
-from setae.cli.runs import RunOptions, ended_early, make_way, say, what_is_left, write_report
+from setae.cli.runs import (
+    RunOptions,
+    ended_early,
+    make_way,
+    remove,
+    say,
+    what_is_left,
+    write_report,
+)
 from setae.cli.scan_jobs import SAME_START_MM, Job
 from setae.errors import InputError
 from setae.experiments import scan as scans
@@ -187,8 +195,10 @@ class _Scanning:
             require_reachable(opened.stage, scans.arm_targets_mm(job.config.scan))
             # Only now, so that a board that isn't there costs neither work nor a folder.
             log = self._folder() / job.name
-            if self._run.force or log in job.replaces:
+            if self._run.force:
                 make_way(log)
+            elif log in job.replaces:
+                remove(log)
             if self._by_hand(job):
                 _ask_for_start(opened.robot)
             about = {
