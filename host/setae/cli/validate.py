@@ -81,7 +81,8 @@ def validate_command(
     resume
         Go on with a run in --out that ended early.
     force
-        Use --out though it holds files; logs of the same names are replaced.
+        Use --out though it holds files. Logs of the same names are replaced, and with them those
+        that resumed them, and the positions that were measured of them.
     report
         Write the report.
     list_targets
