@@ -73,9 +73,7 @@ def differences(scans: Sequence[Scan]) -> tuple[str, ...]:
 
 def _settings(scan: Scan) -> Config:
     """The configuration less what is told of by itself, or follows from the object."""
-    rest = dataclasses.replace(
-        scan.config.scan, area_mm=(0.0, 0.0), step_mm=1.0, order="zigzag", tallest_mm=0.0
-    )
+    rest = dataclasses.replace(scan.config.scan, area_mm=(0.0, 0.0), step_mm=1.0, tallest_mm=0.0)
     return dataclasses.replace(scan.config, scan=rest, plant="ideal")
 
 

@@ -25,6 +25,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from typing import Any, BinaryIO, Final
 
 from setae.errors import ArmFrozenError
@@ -131,6 +132,9 @@ def main() -> None:
             _serve(sys.stdin.buffer, _Told(pipe), host)
         except (EOFError, BrokenPipeError):
             os._exit(0)
+        except Exception:  # the host tells its last line; an ordinary end waits for the library
+            traceback.print_exc()
+            os._exit(1)
 
 
 if __name__ == "__main__":

@@ -217,9 +217,11 @@ class Controller:
         now_s = time.monotonic()
         if self._control.isProgramRunning():
             self._ended_s = None
-        elif self._ended_s is None:
-            self._ended_s = now_s
-        return self._ended_s is not None and now_s - self._ended_s > _ENDED_S
+            return False
+        ended_s = self._ended_s  # once: the thread that watches asks too
+        if ended_s is None:
+            self._ended_s = ended_s = now_s
+        return now_s - ended_s > _ENDED_S
 
     @property
     def timestamp_s(self) -> float:

@@ -358,12 +358,14 @@ class UrStage:
         self._closed = True
         if self._failure is None:
             self._failure = StageError("The arm was let go of.", "Connect to it again.")
-        self._watch.close()
-        if self._connecting.done and not self._lost:  # else it does not answer
-            with contextlib.suppress(StageError, RuntimeError):
-                self._process.submit("goodbye", "close").wait(_GOODBYE_TIMEOUT_S)
-        self._process.close()
-        self._driven.discard(self._host)
+        try:
+            self._watch.close()
+            if self._connecting.done and not self._lost:  # else it does not answer
+                with contextlib.suppress(StageError, RuntimeError):
+                    self._process.submit("goodbye", "close").wait(_GOODBYE_TIMEOUT_S)
+        finally:  # also after a Ctrl-C: nobody closes it a second time
+            self._process.close()
+            self._driven.discard(self._host)
 
     def __enter__(self) -> Self:
         return self

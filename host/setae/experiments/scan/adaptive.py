@@ -27,6 +27,7 @@ _LONGER_MM = 1.0
 _SLOWLY = 6.5
 # So many slowly, of which one leads to where it was touched in haste.
 _ANEW = 2.5
+_ANEW_MIN_MM = 6.0  # it is not worth lowering the arm for a few millimetres
 
 
 def adaptive(steps: Steps, survey: Survey, settings: Scan, found: Found) -> None:
@@ -195,7 +196,8 @@ class _Tracer:
         if hasty and feeling.contact is not None:
             # Touched in haste: measure it.
             steps.lower(steps.length_over_mm(feeling.height_mm))
-            feeling = steps.feel(near_mm=_ANEW * clearance_mm) or feel_short(steps)
+            feeling = steps.feel(near_mm=max(_ANEW * clearance_mm, _ANEW_MIN_MM))
+            feeling = known_to_be_there(feeling or feel_short(steps))
         if feeling.mark == "double":
             # In touch at once: from farther up it is seen whether it is so.
             steps.retract(max(steps.short_mm, steps.length_mm - 2 * clearance_mm))
