@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
-from setae.config import load
+from setae.config import load, replaced
 from setae.contact import Contact
 from setae.errors import RefusedError, TrippedError
 from setae.experiments.events import Event
@@ -104,11 +103,10 @@ class Answering:
 
 
 def steps_of(answering: Answering, events: list[Event] | None = None, **settings: float) -> Steps:
-    scan = dataclasses.replace(CONFIG.scan, **settings)  # type: ignore[arg-type]  # all are numbers
     return Steps(
         cast(Robot, answering),
         cast(Stage, answering),
-        dataclasses.replace(CONFIG, scan=scan),
+        replaced(CONFIG, {f"scan.{name}": value for name, value in settings.items()}),
         on_event=None if events is None else events.append,
     )
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests.ur.controller import FakeController, patient
+from tests.ur.driving import ends_by_a_pressed_stop
 
 from setae import record, rig
 from setae.cli import main
@@ -16,7 +17,6 @@ from setae.errors import (
     ArmBoxError,
     ArmFrozenError,
     ArmSafetyError,
-    ArmStoppedError,
     StageError,
     StoppedError,
 )
@@ -124,19 +124,11 @@ def test_a_stop_that_is_pressed_while_the_robot_feels_stops_it(fake: FakeControl
     config = quick()
     with rig.open("sim://", config=config, stage=fake.url) as opened:
         opened.robot.enable()
-        told = fake.told()
-
-        def once_lowered(_: Event) -> None:
-            if not opened.stage.moving and opened.stage.position_mm[2] < -ON_THE_WAY_MM:
-                fake.tell("stop_program")
-                told.update(fake.told())
-
-        opened.robot.session.subscribe(once_lowered)
-        with pytest.raises(ArmStoppedError, match="stopped or paused at the controller"):
-            explore(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
-        assert opened.robot.state is State.STOPPED
-    assert told["move"]
-    assert fake.told() == told, "it moved, or its program runs again"
+        ends_by_a_pressed_stop(
+            fake, opened,
+            when=lambda: not opened.stage.moving and opened.stage.position_mm[2] < -ON_THE_WAY_MM,
+            run=lambda: explore(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S),
+        )  # fmt: skip
 
 
 def test_a_contact_while_the_arm_lowers_stops_the_arm(fake: FakeController) -> None:

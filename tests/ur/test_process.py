@@ -7,7 +7,6 @@ import select
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,35 +14,34 @@ from typing import IO
 
 import pytest
 from tests.ur.controller import FakeController, controller
-from tests.ur.test_stage import TIMEOUT_S, connected, far_on_its_way, poll_until, with_ur
+from tests.ur.driving import (
+    TIMEOUT_S,
+    connected,
+    far_on_its_way,
+    poll_until,
+    wait_until,
+    with_ur,
+)
 
 from setae.errors import ArmFrozenError, StageError
 from setae.ur import UrStage
 
 # As a user's script is: without a guard against being imported.
 SCRIPT = """
-import dataclasses, sys, time
-from setae.config import load
+import sys
 from setae.ur import UrStage
-from tests.ur.controller import patient
+from tests.ur.driving import poll_until, with_ur
 
-config = load()
-settings = dataclasses.replace(patient(config.ur), watchdog_hz=5.0)
-stage = UrStage(sys.argv[1], dataclasses.replace(config, ur=settings))
+stage = UrStage(sys.argv[1], with_ur(watchdog_hz=1.0))
 stage.move_to((0, 0, float(sys.argv[2])), speed_mm_s=20)
-while stage.moving and sys.argv[2] == "-1":
-    stage.poll(0)
-    time.sleep(0.005)
+if sys.argv[2] == "-1":
+    poll_until(stage, lambda: not stage.moving)
 try:
     print(stage._process.pid, flush=True)
-    while True:
-        stage.poll(0)
-        time.sleep(0.005)
+    poll_until(stage, lambda: False)
 except KeyboardInterrupt:
     stage.stop()
-    while stage.moving:
-        stage.poll(0)
-        time.sleep(0.005)
+    poll_until(stage, lambda: not stage.moving)
     print("rests", flush=True)
 """
 
@@ -161,10 +159,7 @@ def test_a_host_that_is_killed_takes_the_library_along(fake: FakeController, z_m
             assert ended
         finally:
             os.close(library)
-    end_s = time.monotonic() + TIMEOUT_S
-    while fake.told()["playing"]:
-        assert time.monotonic() < end_s, "the controller's watchdog was fed by somebody"
-        time.sleep(0.01)
+    wait_until(lambda: not fake.told()["playing"])  # nobody feeds the controller's watchdog
 
 
 def test_ctrl_c_leaves_the_host_an_arm_that_it_can_brake(fake: FakeController) -> None:

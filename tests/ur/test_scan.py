@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.ur.controller import FakeController, patient
+from tests.ur.driving import ends_by_a_pressed_stop
 
 from setae import record, rig
 from setae.cli import main
@@ -17,7 +18,6 @@ from setae.errors import (
     ArmBoxError,
     ArmFrozenError,
     ArmSafetyError,
-    ArmStoppedError,
     StageError,
 )
 from setae.experiments.scan import read, scan, simulate
@@ -97,19 +97,11 @@ def test_a_stop_that_is_pressed_between_two_steps_ends_the_scan(fake: FakeContro
     config, scene = quick()
     with rig.open("sim://", config=config, scene=scene, stage=fake.url) as opened:
         opened.robot.enable()
-        told = fake.told()
-
-        def between_steps(_: Event) -> None:
-            if not opened.stage.moving and opened.stage.position_mm[0] > ON_THE_WAY_MM:
-                fake.tell("stop_program")
-                told.update(fake.told())
-
-        opened.robot.session.subscribe(between_steps)
-        with pytest.raises(ArmStoppedError, match="stopped or paused at the controller"):
-            scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S)
-        assert opened.robot.state is State.STOPPED
-    assert told["move"]
-    assert fake.told() == told, "it moved, or its program runs again"
+        ends_by_a_pressed_stop(
+            fake, opened,
+            when=lambda: not opened.stage.moving and opened.stage.position_mm[0] > ON_THE_WAY_MM,
+            run=lambda: scan(opened.robot, opened.stage, arm_timeout_s=ARM_TIMEOUT_S),
+        )  # fmt: skip
 
 
 def test_a_corner_outside_of_the_box_is_told_before_anything_moves(fake: FakeController) -> None:

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.ur.controller import FakeController, patient
+from tests.ur.controller import FakeController
+from tests.ur.driving import NEAR_MM, connected, far_on_its_way, poll_until, wait_until, with_ur
 from tests.ur.turns import after, back, turn_of, turned, vector_of
 
-from setae.config import Config, load
+from setae.config import load
 from setae.errors import (
     ArmBoxError,
     ArmFrozenError,
@@ -33,33 +29,6 @@ from setae.ur import UrStage
 from setae.ur.pose import WorldFrame, rotation
 from setae.ur.process import Job, Method
 from setae.ur.watch import Watch
-
-TIMEOUT_S = 60.0
-NEAR_MM = 0.3
-
-
-def with_ur(**changes: Any) -> Config:
-    config = load()
-    return dataclasses.replace(config, ur=dataclasses.replace(patient(config.ur), **changes))
-
-
-@contextmanager
-def connected(fake: FakeController, **changes: Any) -> Iterator[UrStage]:
-    with UrStage(fake.url, with_ur(**changes)) as stage:
-        yield stage
-
-
-def poll_until(stage: UrStage, done: Callable[[], bool]) -> None:
-    """Poll as a session does, every few milliseconds of the controller's real time."""
-    end_s = time.monotonic() + TIMEOUT_S
-    while not done():
-        assert time.monotonic() < end_s, "did not happen"
-        stage.poll(0)
-        time.sleep(0.005)
-
-
-def far_on_its_way(stage: UrStage) -> bool:
-    return stage.position_mm[2] < -5
 
 
 def test_it_moves_to_where_it_was_sent_in_the_world_that_began_at_its_start(
@@ -213,10 +182,7 @@ def test_a_frozen_controller_is_noticed_by_a_host_that_was_busy(fake: FakeContro
     """
     with connected(fake, state_age_s=0.5) as stage:
         fake.freeze()
-        end_s = time.monotonic() + TIMEOUT_S
-        while stage.state_age_s <= 0.5:  # and nobody polls
-            assert time.monotonic() < end_s
-            time.sleep(0.005)
+        wait_until(lambda: stage.state_age_s > 0.5)  # and nobody polls
         with pytest.raises(ArmFrozenError):
             stage.poll(0)
 
@@ -239,10 +205,7 @@ def test_a_state_that_the_library_cannot_tell_counts_as_unseen() -> None:
     clock = itertools.count(100.0, 0.01)
     watch = Watch(lambda: None, lambda: next(clock))
     watch.start()
-    end_s = time.monotonic() + TIMEOUT_S
-    while watch.unseen_s < 0.1:  # ten looks of the thread
-        assert time.monotonic() < end_s
-        time.sleep(0.005)
+    wait_until(lambda: watch.unseen_s >= 0.1)  # ten looks of the thread
     watch.close()
 
 

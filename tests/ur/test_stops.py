@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 from tests.ur.controller import FakeController
-from tests.ur.test_stage import NEAR_MM, TIMEOUT_S, connected, far_on_its_way, poll_until
+from tests.ur.driving import NEAR_MM, connected, far_on_its_way, poll_until, wait_until
 
 from setae.errors import ArmStoppedError
 from setae.ur import UrStage
@@ -42,10 +40,7 @@ def test_a_stop_that_was_pressed_while_the_arm_rested_is_for_good(
         poll_until(stage, lambda: not stage.moving)
         before = fake.told()
         fake.tell("stop_program")
-        end_s = time.monotonic() + TIMEOUT_S
-        while stage._process.state.program_runs:
-            assert time.monotonic() < end_s
-            time.sleep(0.005)
+        wait_until(lambda: not stage._process.state.program_runs)
         says = r"stopped or paused at the controller\."
         if polled:
             with pytest.raises(ArmStoppedError, match=says):
@@ -81,15 +76,16 @@ def test_a_move_just_after_a_stop_does_not_start_the_program_again(fake: FakeCon
 def test_the_controllers_watchdog_stops_the_arm_of_a_host_that_hangs(
     fake: FakeController,
 ) -> None:
-    with connected(fake, watchdog_hz=5.0) as stage:
+    with connected(fake, watchdog_hz=1.0) as stage:
         stage.move_to((0, 0, -300), speed_mm_s=20)
         poll_until(stage, lambda: far_on_its_way(stage))
-        # The host hangs: nobody polls, and after a fifth of a second the controller acts.
-        end_s = time.monotonic() + TIMEOUT_S
-        # Two connections tell of it: one may be a report behind the other.
-        while (state := stage._process.state).program_runs or state.speed_mm_s != 0:
-            assert time.monotonic() < end_s
-            time.sleep(0.005)
+
+        def at_rest() -> bool:
+            # Two connections tell of it: one may be a report behind the other.
+            state = stage._process.state
+            return not state.program_runs and state.speed_mm_s == 0
+
+        wait_until(at_rest)  # the host hangs: nobody polls, and after a second the controller acts
         with pytest.raises(ArmStoppedError, match="watchdog stopped the arm: for"):
             stage.poll(0)
         assert stage.position_mm[2] > -100
@@ -99,17 +95,15 @@ def test_the_controllers_watchdog_stops_the_arm_of_a_host_that_hangs(
 def idle(stage: UrStage) -> None:
     """Nobody polls, until the controller's watchdog would have expired twice."""
     told_s = stage._process.state.timestamp_s
-    end_s = time.monotonic() + TIMEOUT_S
-    while stage._process.state.timestamp_s < told_s + 2 / stage._settings.watchdog_hz:
-        assert time.monotonic() < end_s
-        time.sleep(0.005)
+    end_s = told_s + 2 / stage._settings.watchdog_hz
+    wait_until(lambda: stage._process.state.timestamp_s >= end_s)
 
 
 def test_a_pause_of_the_host_at_rest_costs_nothing(fake: FakeController) -> None:
     """A trajectory that was computed for long, or a researcher who thought, let the watchdog end
     the arm's program: the next move was refused.
     """
-    with connected(fake, watchdog_hz=2.0) as stage:
+    with connected(fake, watchdog_hz=1.0) as stage:
         idle(stage)
         stage.move_to((0, 0, -5))
         poll_until(stage, lambda: not stage.moving)
